@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -14,7 +15,7 @@ from bentray_workers.cluster.connection import Cluster
 from bentray_workers.cluster.scheduler_load import SchedulerLoad, load_of
 from bentray_workers.cluster.worker_health import WorkerHealth, health_of
 from bentray_workers.files.dataset.counts import DatasetCounts
-from bentray_workers.files.dataset.scan import counts_in
+from bentray_workers.files.dataset.scan import counts_in, measured_frequency
 from bentray_workers.reconstruction import planning
 from bentray_workers.rendering import turntable_planning
 from bentray_workers.rendering.refraction_view import check_even
@@ -92,9 +93,9 @@ class Compute:
         """
         nothing: tuple[WorkerCapacity, ...] = ()
         capacities = self._asked(lambda client: probed_capacities(client, settings), nothing)
-        stored = None if counts is None else DatasetCounts(**counts)
-        if stored is None or (stored.samples and stored.frequency_hz is None):
-            stored = counts_in(self._fetch(path))
+        stored = counts_in(self._fetch(path)) if counts is None else DatasetCounts(**counts)
+        if stored.samples and stored.frequency_hz is None:
+            stored = replace(stored, frequency_hz=measured_frequency(self._fetch(path)))
         return planning.plan(stored.summary(settings), settings, capacities).to_dict()
 
     def plan_simulation(self, request: PhantomScan) -> dict[str, Any]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import math
-from contextlib import suppress
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -19,7 +18,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.requests.names import DEFAULT_PICKER
 
 from ..files.dataset import read_dataset
-from ..files.dataset.scan import lacks_water, measured_spectrum, open_slice, trace_samples
+from ..files.dataset.scan import lacks_water, measured_frequency, open_slice, trace_samples
 from ..files.dataset.units import propose
 
 # Elements of a drawing, and receivers and samples of the traces of a view; of more, every n-th is taken.
@@ -39,7 +38,7 @@ def scan_geometry(path: Path, *, water_temperature_c: float | None = None) -> di
     # Also of a scan that an earlier version took, and that the checks of today would refuse.
     recorded = read_dataset(path, traces=False, plausible=False)
     scan = recorded.in_water_of(water_temperature_c)
-    measured = _measured_frequency(path, scan)
+    measured = measured_frequency(path)
     frequency = scan.center_frequency_hz or measured
     every = max(1, math.ceil(len(scan.element_position_m) / MAX_ELEMENTS))
     shown = np.arange(0, len(scan.element_position_m), every)
@@ -97,9 +96,7 @@ def emission_traces(
             raise InvalidInput(name, value, f"0 to {count - 1}")
     # The picker alone needs it; its estimate reads traces of other emissions too.
     frequency = (
-        None
-        if scan.picked or lacks_water(path)
-        else scan.center_frequency_hz or _measured_frequency(path, scan)
+        None if scan.picked or lacks_water(path) else scan.center_frequency_hz or measured_frequency(path)
     )
     with open_slice(path, scan, index) as dataset:
         traces = None if dataset.waveform is None else getattr(dataset.waveform, what)
@@ -130,15 +127,6 @@ def emission_traces(
         "pick_s": None if picks is None else _numbers((straight + picks)[receivers]),
         "picker": picker,
     }
-
-
-def _measured_frequency(path: Path, scan: Dataset) -> float | None:
-    """Centre frequency of the traces, Hz; None without a pulse in them."""
-    # Traces without a pulse are a finding of the quality report.
-    with suppress(InvalidInput):
-        spectrum = measured_spectrum(path, scan)
-        return None if spectrum is None else spectrum.center_frequency_hz
-    return None
 
 
 def _picks(dataset: Dataset, emission: int) -> tuple[Floats | None, str]:

@@ -10,7 +10,6 @@ import numpy as np
 
 from bentray_kernels.acquisition.element_pitch import element_pitch
 from bentray_kernels.acquisition.impossible_times import impossible_words
-from bentray_kernels.arrays import Floats, Ints
 from bentray_kernels.tomography.decomposition import automatic_decomposition
 from bentray_kernels.tomography.image_grid import automatic_nodes
 
@@ -145,8 +144,19 @@ class DatasetCounts:
         """Counts of a dataset; its traces may be placeholders."""
         traces = dataset.waveform
         both = [] if traces is None else [data for data in (traces.object, traces.water) if data is not None]
+        position, heights = dataset.element_position_m, dataset.slice_z_m
+        in_space = position.shape[1] == 3
+        z = position[:, 2] if in_space else np.zeros(1) if heights is None else heights
         return cls(
-            **array_counts(dataset.element_position_m, dataset.tx, dataset.rx, dataset.slice_z_m),
+            emissions=len(dataset.tx),
+            receivers=len(dataset.rx),
+            elements=len(np.union1d(dataset.tx, dataset.rx)),
+            slices=dataset.slices,
+            in_space=in_space,
+            height_m=float(np.ptp(z)),
+            width_m=float(np.ptp(position[:, :2], axis=0).max()),
+            pitch_m=element_pitch(position),
+            decomposition=automatic_decomposition(position),
             times=dataset.picked,
             amplitudes=dataset.log_ratio_np is not None,
             traces_bytes=sum(array.size * array.dtype.itemsize for array in both),
@@ -215,29 +225,6 @@ class DatasetCounts:
             self.water_mps,
             self.water_shot,
         )
-
-
-def array_counts(position: Floats, tx: Ints, rx: Ints, heights: Floats | None) -> dict[str, Any]:
-    """The fields of ``DatasetCounts`` from geometry and acquisition.
-
-    Args:
-        position: (elements, 2 or 3), m.
-        tx, rx: (ntx,), (nrx,).
-        heights: (nz,) of the slices, m; None for a plain scan.
-    """
-    in_space = position.shape[1] == 3
-    z = position[:, 2] if in_space else np.zeros(1) if heights is None else heights
-    return {
-        "emissions": len(tx),
-        "receivers": len(rx),
-        "elements": len(np.union1d(tx, rx)),
-        "slices": 1 if heights is None else len(heights),
-        "in_space": in_space,
-        "height_m": float(np.ptp(z)),
-        "width_m": float(np.ptp(position[:, :2], axis=0).max()),
-        "pitch_m": element_pitch(position),
-        "decomposition": automatic_decomposition(position),
-    }
 
 
 def record_of(dataset: Dataset) -> dict[str, Any]:

@@ -16,11 +16,10 @@ from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.emissions import Emissions
 from bentray_kernels.acquisition.pulse_spectrum import PulseSpectrum, estimate_spectrum
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.requests.limits import check_size
 
 from ..hdf5_reading import Reader, opened, rejecting_hdf5_damage
-from .counts import BLOCK_BYTES, DatasetCounts, array_counts
-from .read import NUMERIC, TRACES, dataset_of, kept_traces, trace_type, waveform_in
+from .counts import BLOCK_BYTES, DatasetCounts
+from .read import NUMERIC, TRACES, dataset_of, kept_traces, placeholder_traces, trace_type, waveform_in
 
 
 class ScanHeader(NamedTuple):
@@ -59,18 +58,13 @@ def read_header(path: Path, *, plausible: bool = True) -> ScanHeader:
     return ScanHeader(dataset, samples, lacking, spectrum)
 
 
-def measured_spectrum(path: Path, dataset: Dataset) -> PulseSpectrum | None:
-    """The spectrum of the pulse of a scan, from the first slice of its traces; None without traces.
-
-    Args:
-        path: of the HDF5 file.
-        dataset: read from it.
-
-    Raises:
-        InvalidInput: for traces without a pulse.
-    """
-    with opened(path) as reader:
-        return _spectrum(reader, stacked=dataset.slice_z_m is not None)
+def measured_frequency(path: Path) -> float | None:
+    """Centre frequency of the traces, Hz, from their first slice; None without traces or a pulse in them."""
+    # Traces without a pulse are a finding of the quality report.
+    with opened(path) as reader, suppress(InvalidInput):
+        spectrum = _spectrum(reader, stacked=reader.has("slice/z_m"))
+        return None if spectrum is None else spectrum.center_frequency_hz
+    return None
 
 
 def trace_samples(path: Path) -> int:
@@ -86,44 +80,17 @@ def lacks_water(path: Path) -> bool:
 
 
 def counts_in(path: Path) -> DatasetCounts:
-    """Counts of a dataset file in canonical form, without reading the arrays over its pairs.
-
-    Of a scan without a centre frequency, some emissions are read to estimate it.
+    """Counts of a dataset file; a missing centre frequency is that of its traces.
 
     Args:
         path: of the HDF5 file.
 
     Raises:
-        InvalidInput: for a file without positions, emitters or receivers, or with too many.
+        InvalidInput: as ``read_dataset``, but for units and an order that are only implausible.
     """
     with opened(path) as reader:
-        position, tx, rx = (
-            _sized(reader, path)
-            for path in ("geometry/element_position_m", "acquisition/tx", "acquisition/rx")
-        )
-        heights = _sized(reader, "slice/z_m") if reader.has("slice/z_m") else None
-        received = reader.checked("waveform/object", NUMERIC, "traces")
-        water = reader.number("water", "sound_speed_mps", "m/s")
-        frequency = reader.number("acquisition", "center_frequency_hz", "Hz")
-        if frequency is None:
-            # Traces without a pulse are rejected when they are read, not when they are counted.
-            with suppress(InvalidInput):
-                spectrum = _spectrum(reader, stacked=heights is not None)
-                frequency = None if spectrum is None else spectrum.center_frequency_hz
-        return DatasetCounts(
-            **array_counts(position, tx, rx, heights),
-            times=any(_bytes(reader, f"traveltime/{name}") for name in ("delta_tof_s", "tof_s")),
-            amplitudes=_bytes(reader, "amplitude/log_ratio_np") > 0,
-            traces_bytes=sum(_bytes(reader, f"waveform/{name}") for name in ("object", "water")),
-            samples=_samples(reader),
-            sample_bytes=0 if received is None else trace_type(received.dtype).itemsize,
-            rate_hz=reader.number("acquisition", "sampling_rate_hz", "Hz"),
-            frequency_hz=frequency,
-            # The speed hardly affects sizes.
-            water_mps=1500.0 if water is None else water,
-            water_shot=_bytes(reader, "waveform/water") > 0,
-            normals=reader.has("geometry/element_normal"),
-        )
+        counts = DatasetCounts.from_dataset(dataset_of(reader, placeholder_traces, plausible=False))
+    return counts if counts.frequency_hz else replace(counts, frequency_hz=measured_frequency(path))
 
 
 @contextmanager
@@ -175,7 +142,11 @@ def emissions_in(
 
 
 def _spectrum(reader: Reader, *, stacked: bool) -> PulseSpectrum | None:
-    """Like ``measured_spectrum`` for an open file, whose arrays may have an axis of slices."""
+    """The spectrum of the pulse, from the first slice of the traces; None without traces.
+
+    Raises:
+        InvalidInput: for traces without a pulse.
+    """
     rate = reader.number("acquisition", "sampling_rate_hz", "Hz")
     traces = emissions_in(reader, "waveform/object", index=0 if stacked else None)
     return None if traces is None or rate is None else estimate_spectrum(traces, rate)
@@ -189,15 +160,3 @@ def _lacks_water(reader: Reader) -> bool:
 def _samples(reader: Reader) -> int:
     received = reader.checked("waveform/object", NUMERIC, TRACES)
     return 0 if received is None else int(received.shape[-1])
-
-
-def _sized(reader: Reader, path: str) -> NDArray[Any]:
-    """An array, whose size is checked before it is read."""
-    declared = reader.checked(path, NUMERIC, "numbers")
-    check_size(path, () if declared is None else declared.shape)
-    return reader.required(path, NUMERIC, "numbers")
-
-
-def _bytes(reader: Reader, path: str) -> int:
-    stored = reader.checked(path, NUMERIC, "numbers")
-    return 0 if stored is None else math.prod(stored.shape) * stored.dtype.itemsize
