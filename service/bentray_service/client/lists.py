@@ -83,20 +83,17 @@ def datasets(
         limit: largest number of scans.
         text: only scans with this text in id, name, title or notes.
     """
-    found = yield from _list(DatasetList, "/v1/datasets", limit, text)
-    return RecordList(found.datasets)
+    return (yield from _list(DatasetList, "/v1/datasets", limit, text))
 
 
 def volumes(connection: Connection, limit: int = 100) -> Flow[RecordList[VolumeRecord]]:
     """List the newest volumes, reconstructed and uploaded, at most 1000."""
-    found = yield from _list(VolumeList, "/v1/volumes", limit)
-    return RecordList(found.volumes)
+    return (yield from _list(VolumeList, "/v1/volumes", limit))
 
 
 def meshes(connection: Connection, limit: int = 100) -> Flow[RecordList[MeshRecord]]:
     """List the newest meshes, at most 1000."""
-    found = yield from _list(MeshList, "/v1/meshes", limit)
-    return RecordList(found.meshes)
+    return (yield from _list(MeshList, "/v1/meshes", limit))
 
 
 def jobs(
@@ -164,8 +161,7 @@ def batch(connection: Connection, batch: BatchId) -> Flow[BatchRecord]:
 
 def batches(connection: Connection, limit: int = 100) -> Flow[RecordList[BatchRecord]]:
     """List the newest batches, at most 1000."""
-    found = yield from _list(BatchList, "/v1/batches", limit)
-    return RecordList(found.batches)
+    return (yield from _list(BatchList, "/v1/batches", limit))
 
 
 def get(model: type[Answer], path: str, params: dict[str, Any] | None = None) -> Flow[Answer]:
@@ -186,9 +182,11 @@ def answer(
     return model.model_validate_json(response.content)
 
 
-def _list(model: type[Answer], path: str, limit: int, text: str | None = None) -> Flow[Answer]:
+def _list(model: type[Answer], path: str, limit: int, text: str | None = None) -> Flow[RecordList[Any]]:
     LIMIT.check("limit", limit)
-    return (yield from get(model, path, {"limit": limit} | ({} if text is None else {"text": text})))
+    found = yield from get(model, path, {"limit": limit} | ({} if text is None else {"text": text}))
+    # The field of the records has the name of the resource.
+    return RecordList(getattr(found, path.rpartition("/")[2]))
 
 
 def projects(connection: Connection) -> Flow[RecordList[ProjectRecord]]:

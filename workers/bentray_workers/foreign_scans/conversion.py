@@ -97,7 +97,8 @@ def _read(scan: OpenScan, given: ScanMetadata) -> tuple[Arrays, Layout]:
             own.reversed_axes = False
     else:
         reader = reader_of(scan)
-        reads, own = reader.layout, reader.read(scan)
+        reads = reader.layout or named_layout
+        own = reader.read(scan)
     arrays: Arrays = ArraysWithMetadata(own, given) if given else own
     try:
         return arrays, reads(arrays)

@@ -25,7 +25,6 @@ from ..files.damage import rejecting_damage
 from ..files.zip_checks import WHOLE, check_zip, member_file, naming
 from .arrays import StreamedScan, Traces, read_small
 from .kit_signals import RATE_HZ, UNDERSAMPLING, compress, decode_float16, reconstruct_undersampled
-from .layouts import named_layout
 from .matlab5 import Matlab5
 from .open_scan import OpenScan
 from .scan_reader import ScanReader, Variable
@@ -396,5 +395,4 @@ READER = ScanReader(
     ),
     detect=_detect,
     read=_read,
-    layout=named_layout,
 )

@@ -27,7 +27,6 @@ from ..files.hdf5_reading import Reader, opened, rejecting_hdf5_damage
 from ..files.npz import Npz
 from ..files.zip_checks import WHOLE, check_zip, member_file, naming, read_member
 from .arrays import LARGEST_WHOLE
-from .layouts import named_layout
 from .open_scan import OpenScan
 from .scan_reader import ScanReader, Variable
 
@@ -159,5 +158,4 @@ READER = ScanReader(
     ),
     detect=_detect,
     read=_read,
-    layout=named_layout,
 )

@@ -16,7 +16,6 @@ from bentray_kernels.requests.limits import check_size
 
 from ..files.dataset.read import NUMBERS, PAIR_ARRAYS, trace_type
 from .arrays import Arrays, read_small
-from .open_scan import OpenScan
 from .scan_reader import Layout, ScanReader, Variable
 
 # Tolerance of the time axis, relative to its step.
@@ -249,11 +248,6 @@ def _has(*names: str) -> Any:
     return lambda scan: bool(scan.names & set(names))
 
 
-def _arrays(scan: OpenScan) -> Arrays:
-    assert scan.arrays is not None
-    return scan.arrays
-
-
 _WATER = (
     Variable(
         "sound_speed_mps or temperature_c", "number", "m/s, °C", "of the water; absent: 20 °C assumed", "no"
@@ -270,7 +264,6 @@ DELTA_TOF = ScanReader(
         *_WATER,
     ),
     detect=_has("delta_tof", "element_positions"),
-    read=_arrays,
     layout=_delta_tof,
 )
 FULL_DATASET = ScanReader(
@@ -285,7 +278,6 @@ FULL_DATASET = ScanReader(
         *_WATER,
     ),
     detect=_has("transducerPositionsXY", "full_dataset"),
-    read=_arrays,
     layout=_full_dataset,
 )
 NAMED = ScanReader(
@@ -303,6 +295,4 @@ NAMED = ScanReader(
         *_WATER,
     ),
     detect=_has("element_position_m", "geometry/element_position_m"),
-    read=_arrays,
-    layout=named_layout,
 )

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from bentray_kernels.errors import InvalidInput
 
 from .arrays import StreamedScan, Traces
-from .layouts import named_layout
 from .matlab73 import rows_of
 from .open_scan import OpenScan
 from .scan_reader import ScanReader, Variable
@@ -98,5 +97,4 @@ READER = ScanReader(
     ),
     detect=_detect,
     read=_read,
-    layout=named_layout,
 )

@@ -34,6 +34,11 @@ class Variable:
     required: str = "yes"
 
 
+def _arrays(scan: OpenScan) -> Arrays:
+    assert scan.arrays is not None
+    return scan.arrays
+
+
 @dataclass(frozen=True)
 class ScanReader:
     """A format of scans.
@@ -43,13 +48,13 @@ class ScanReader:
         about: container, source of the format, and conventions.
         variables: its documentation.
         detect: whether an open file has this format, by its content.
-        read: its arrays.
-        layout: the dataset in the arrays.
+        read: its arrays; by default those of the file as they are.
+        layout: the dataset in the arrays; None: under the names of the upload format.
     """
 
     title: str
     about: str
     variables: tuple[Variable, ...]
     detect: Callable[[OpenScan], bool]
-    read: Callable[[OpenScan], Arrays]
-    layout: Callable[[Arrays], Layout]
+    read: Callable[[OpenScan], Arrays] = _arrays
+    layout: Callable[[Arrays], Layout] | None = None

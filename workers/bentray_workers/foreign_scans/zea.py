@@ -20,7 +20,6 @@ from bentray_kernels.requests.limits import check_size
 from ..files.damage import ACCEPTED
 from ..files.hdf5_reading import Reader
 from .arrays import StreamedScan, Traces
-from .layouts import named_layout
 from .matlab73 import rows_of
 from .open_scan import OpenScan
 from .scan_reader import ScanReader, Variable
@@ -181,5 +180,4 @@ READER = ScanReader(
     ),
     detect=_detect,
     read=_read,
-    layout=named_layout,
 )
