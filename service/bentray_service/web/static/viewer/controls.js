@@ -2,7 +2,7 @@
 import { Button, html, Options, useLayoutEffect, useRef } from "../parts/view.js";
 import { NAMES } from "./colormaps.js";
 import { AXES } from "./field.js";
-import { TOOLS } from "./state.js";
+import { TOOLS, WHOLE_VIEWS } from "./state.js";
 
 const MAPS = NAMES.map((name) => [name, name === "RdBu_r" ? "blue–red" : name]);
 
@@ -76,7 +76,7 @@ export function Window({ low, high, map, fade, planes, fades, sliced, setWindow,
     <label>to <${NumberField} name="high" value=${limit(high)} onChange=${set} /></label>
     <${Button} onClick=${() => change({ window: null })}>Automatic</${Button}>
     <label>Colours <select name="map" value=${map} onChange=${({ target }) => change({ map: target.value })}><${Options} entries=${MAPS} /></select></label>
-    <${Button} onClick=${() => change({ views: {} })}>Whole image</${Button}>
+    <${Button} onClick=${() => change({ views: WHOLE_VIEWS })}>Whole image</${Button}>
     <label class="fade" hidden=${!fades}><input type="checkbox" name="fade" checked=${fade} onChange=${({ target }) => change({ fade: target.checked })} /> Fade what is not known</label>
     <label class="planes" hidden=${!sliced}><input type="checkbox" name="planes" checked=${planes} onChange=${({ target }) => change({ planes: target.checked })} /> Three planes</label>
   </fieldset>`;

@@ -10,6 +10,8 @@ export class Field {
     this.shape = shape;
     this.spacing = spacing.map((one) => one ?? 1);
     this.origin = origin.map((one, k) => (spacing[k] === null ? 0 : one));
+    // By axis: the plane at the cursor, which stays the same object until it moves, so that each is coloured once.
+    this.kept = {};
   }
 
   get dimension() {
@@ -44,6 +46,12 @@ export class Field {
       for (let b = 0; b < nb; b += 1, place += strides[second]) values[k++] = this.values[place];
     }
     return { ...grid, values };
+  }
+
+  planeAt(axis, cursor) {
+    const index = this.nearest(axis, cursor[AXES.indexOf(axis)]);
+    if (this.kept[axis]?.index !== index) this.kept[axis] = { index, plane: this.plane(axis, index) };
+    return this.kept[axis].plane;
   }
 
   // Position of a node along an axis, mm; its number where the heights are uneven; 0 where there is no such axis.
@@ -92,63 +100,22 @@ export function extent({ na, nb, spacing, origin }) {
 // One plane minus another, at the nodes of the first.
 function difference(plane, other) {
   const values = new Float64Array(plane.na * plane.nb);
-  const same = ["na", "nb"].every((name) => plane[name] === other[name])
-    && ["spacing", "origin"].every((name) => plane[name].every((value, k) => value === other[name][k]));
   for (let a = 0; a < plane.na; a += 1) {
     for (let b = 0; b < plane.nb; b += 1) {
-      const k = a * plane.nb + b;
       const [x, y] = [plane.origin[0] + a * plane.spacing[0], plane.origin[1] + b * plane.spacing[1]];
-      values[k] = plane.values[k] - (same ? other.values[k] : interpolated(other, x, y));
+      values[a * plane.nb + b] = plane.values[a * plane.nb + b] - interpolated(other, x, y);
     }
   }
-  return { ...plane, values };
+  return { ...plane, values, other };
 }
 
-// Planes of results at a cursor; the same object for the same values, so that each is coloured once.
-export class Planes {
-  // fields: of one quantity, one for each pane; spread: the standard deviation of the only pane, or null; quantity: its name.
-  constructor(quantity, fields, spread) {
-    Object.assign(this, { quantity, fields, spread, kept: new Map() });
-  }
+const differences = new WeakMap();
 
-  get main() {
-    return this.fields[0];
-  }
-
-  // What make() returns, until one of the parts changes.
-  once(key, parts, make) {
-    const before = this.kept.get(key);
-    if (before?.parts.every((part, k) => part === parts[k])) return before.value;
-    const value = make();
-    this.kept.set(key, { parts, value });
-    return value;
-  }
-
-  planeOf(field, key, axis, cursor) {
-    const index = field.nearest(axis, cursor[AXES.indexOf(axis)]);
-    return this.once(`${key} ${axis}`, [field, index], () => field.plane(axis, index));
-  }
-
-  // The plane of a pane.
-  plane(number, axis, cursor) {
-    return this.planeOf(this.fields[number], number, axis, cursor);
-  }
-
-  // A plane of the first field, wherever the cursor is.
-  sliceAt(axis, position) {
-    const index = this.main.nearest(axis, position);
-    return this.once(`slice ${axis} ${index}`, [this.main], () => this.main.plane(axis, index));
-  }
-
-  // The plane of a tile: that of its pane, minus that of the first one where the tile says so.
-  shown({ number, axis, minus }, cursor) {
-    const plane = this.plane(number, axis, cursor);
-    if (!minus) return plane;
-    const first = this.plane(0, axis, cursor);
-    return this.once(`difference ${number} ${axis}`, [plane, first], () => difference(plane, first));
-  }
-
-  deviations(axis, cursor) {
-    return this.spread && this.planeOf(this.spread, "deviations", axis, cursor);
-  }
+// The plane of a tile at a cursor: that of its pane, minus that of the first one where the tile says so. fields: one for each pane.
+export function shownPlane(fields, { number, axis, minus }, cursor) {
+  const plane = fields[number].planeAt(axis, cursor);
+  if (!minus) return plane;
+  const first = fields[0].planeAt(axis, cursor);
+  if (differences.get(plane)?.other !== first) differences.set(plane, difference(plane, first));
+  return differences.get(plane);
 }

@@ -2,8 +2,9 @@
 import { CopyButton } from "../parts/copying.js";
 import { saveBlob } from "../parts/key.js";
 import { HeadedTable } from "../parts/tables.js";
-import { Button, Facts, html } from "../parts/view.js";
+import { Button, Facts, html, useMemo } from "../parts/view.js";
 import { NumberField } from "./controls.js";
+import { AXES } from "./field.js";
 import { outlineOf, profileOf, regionOf } from "./measures.js";
 import { flat, MEASURES, valueOf } from "./measuring.js";
 import { Plot } from "./plot.js";
@@ -106,14 +107,15 @@ function Region({ curves, region, quantity, beside, deviations, detail, onPlace 
   </${Measure}>`;
 }
 
-// Distances, angles and areas in a list; each area with the values in it. planeOf(axis, point): of the first image.
-function List({ measures, planeOf, detail, quantity, change }) {
-  if (!measures.length) return null;
-  const measured = measures.map((measure) => {
+// Distances, angles and areas in a list; each area with the values in it. main: the field of the first image.
+function List({ measures, main, detail, quantity, change }) {
+  const measured = useMemo(() => measures.map((measure) => {
     const { kind, axis, points } = measure;
-    const inside = kind === "area" ? outlineOf(planeOf(axis, points[0]), flat(points, axis), detail) : null;
+    const planeOf = ([point]) => main.plane(axis, main.nearest(axis, point[AXES.indexOf(axis)]));
+    const inside = kind === "area" ? outlineOf(planeOf(points), flat(points, axis), detail) : null;
     return { ...measure, value: valueOf(measure), inside: inside?.nodes ? inside : null };
-  });
+  }), [measures, main]);
+  if (!measures.length) return null;
   const wordsOf = ({ kind, value, inside }) => html`${value.toFixed(kind === "angle" ? 1 : 2)} ${MEASURES[kind].unit}
     ${inside && html`<small>${[
       `${shown(inside.mean, quantity)} ± ${shown(inside.deviation, quantity)} ${quantity.unit}`, `standard error ${shown(inside.standardError, quantity)}`,
@@ -137,13 +139,13 @@ const HINTS = {
 };
 
 // curves: titles and planes of the images at the chosen axis. detail: the resolution width, mm, if it is known.
-export function Measures({ curves, state, quantity, beside, deviations, detail, planeOf, change }) {
+export function Measures({ curves, state, quantity, beside, deviations, detail, main, change }) {
   const onRegion = (place) => change({ region: place && { shape: state.region?.shape ?? (state.tool === "rectangle" ? "rectangle" : "ellipse"), place } });
   const { tool, measures, profile, region } = state;
   const isRegion = ["rectangle", "ellipse"].includes(tool);
   return html`<div class="measures">
     ${HINTS[tool] && html`<${Facts}>${HINTS[tool]}</${Facts}>`}
-    <${List} measures=${measures} planeOf=${planeOf} detail=${detail} quantity=${quantity} change=${change} />
+    <${List} measures=${measures} main=${main} detail=${detail} quantity=${quantity} change=${change} />
     ${(profile || tool === "profile") && html`<${Profile} curves=${curves} place=${profile} quantity=${quantity} onPlace=${(place) => change({ profile: place })} />`}
     ${(region || isRegion) && html`<${Region} curves=${curves} detail=${detail} region=${region} quantity=${quantity} beside=${beside} deviations=${deviations} onPlace=${onRegion} />`}
   </div>`;

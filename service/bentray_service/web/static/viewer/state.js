@@ -11,6 +11,9 @@ export const TOOLS = {
 export const MODES = { side: "Side by side", difference: "Difference", swipe: "Swipe" };
 const MOST_ZOOM = 64;
 const NOTHING = [];
+// Of a plane whose whole image is shown, and of all planes.
+export const WHOLE = { centre: null, zoom: 1 };
+export const WHOLE_VIEWS = { x: WHOLE, y: WHOLE, z: WHOLE };
 
 const short = (value) => String(Number(value.toPrecision(8)));
 
@@ -67,7 +70,7 @@ const VIEW = listOf(3);
 
 // The state that an address asks for; what is wrong in it is left at its default.
 export function stateOf(query) {
-  const state = { views: {}, region: null, draft: null };
+  const state = { views: { ...WHOLE_VIEWS }, region: null, draft: null };
   for (const [field, [name, usual, { read }]] of Object.entries(FIELDS)) state[field] = (query.has(name) ? read(query.get(name)) : undefined) ?? usual;
   for (const axis of AXES) {
     const view = VIEW.read(query.get(`view-${axis}`) ?? "");
@@ -83,7 +86,7 @@ export function stateOf(query) {
 export function queryOfState(state) {
   const query = new URLSearchParams();
   for (const [field, [name, usual, { words }]] of Object.entries(FIELDS)) if (state[field] !== usual && state[field]?.length !== 0) query.set(name, words(state[field]));
-  for (const [axis, { centre, zoom }] of Object.entries(state.views)) query.set(`view-${axis}`, VIEW.words([...centre, zoom]));
+  for (const [axis, { centre, zoom }] of Object.entries(state.views)) if (centre) query.set(`view-${axis}`, VIEW.words([...centre, zoom]));
   if (state.region) query.set(state.region.shape, PLACE.words(state.region.place));
   return query;
 }

@@ -1,23 +1,144 @@
-// One image of the viewer: a canvas that is pointed at, below it its title.
-import { html, useLayoutEffect, useNewest, useRef } from "../parts/view.js";
+// One image of the viewer: a canvas with its title; mouse, pen, touch and keys on it change the state of the view.
+import { usePointers } from "../parts/pointers.js";
+import { html, useLayoutEffect, useRef } from "../parts/view.js";
+import { AXES } from "./field.js";
 import { ImageView } from "./image_view.js";
-import { Pointing } from "./pointing.js";
+import { inPlane, MEASURES, withDrag, withPoint } from "./measuring.js";
+import { clampZoom, WHOLE } from "./state.js";
 
-// image: as for ImageView.show; actionsOf(view): what pointers and keys do, see pointing.js. grip: whether dragging does not scroll the page.
-export function Tile({ title, words, image: { plane, ...look }, grip, actionsOf }) {
-  const [canvas, view, actions] = [useRef(null), useRef(null), useNewest(null)];
+const WHEEL = 1.0015;
+const STEP = 1.25;
+// A press that moves less is a click, and within as many pixels of the page a point is the same one.
+const [STILL, SAME_PX] = [4, 7];
+// Of the window: by a pixel of dragging, and by a key.
+const [DRAG_SHARE, KEY_SHARE] = [1 / 300, 0.05];
+
+const draws = ({ tool }) => !["pan", "window"].includes(tool);
+
+// What pointers and keys do with the plane across an axis. image: its ImageView; main: the field that the cursor keeps to; window: of the colours.
+function actionsOf({ key, axis }, image, { main, state, window, change, setWindow, setHover }) {
+  const { cursor } = state;
+  const across = AXES.indexOf(axis);
+  const [first, second] = inPlane(axis);
+  // A point of the plane at the cursor, [x, y, z].
+  const inSpace = ([a, b]) => cursor.map((place, k) => (k === first ? a : k === second ? b : place));
+  const setView = (centre, zoom) => change({ views: { ...state.views, [axis]: { centre, zoom } } });
+  return {
+    hover(point) {
+      const place = point && image.toPlane(...point);
+      setHover({ at: place && { key, axis, place, other: image.showsOther(place[0]) }, spoken: false });
+    },
+    moveTo(...places) {
+      [first, second].forEach((k, n) => (cursor[k] = main.position(AXES[k], main.nearest(AXES[k], places[n]))));
+      change({});
+    },
+    // A step of the cursor; of the image with Shift.
+    step(da, db, { shiftKey, currentTarget: { clientWidth: width, clientHeight: height } }) {
+      if (shiftKey) return this.pan(image.centre, 0.1 * da * width, 0.1 * db * height);
+      setHover({ at: null, spoken: true });
+      this.moveTo(cursor[first] + da * main.spacing[first], cursor[second] + db * main.spacing[second]);
+    },
+    moveSlice(by) {
+      const index = main.nearest(axis, cursor[across]) + by;
+      if (index >= 0 && index < main.count(axis)) cursor[across] = main.position(axis, index);
+      change({});
+    },
+    mark: (point) => change(withPoint(state, axis, inSpace(point), SAME_PX / image.scale)),
+    // Zoom so that the point under (px, py) stays.
+    zoomAt(px, py, factor) {
+      const [[x, y], centre, before] = [image.toPlane(px, py), image.centre, state.views[axis].zoom];
+      const zoom = clampZoom(before * factor);
+      setView([x + (centre[0] - x) * (before / zoom), y + (centre[1] - y) * (before / zoom)], zoom);
+    },
+    // Show what is some pixels to the right of a centre, and above it.
+    pan: ([x, y], right, up) => setView([x + right / image.scale, y + up / image.scale], state.views[axis].zoom),
+    // A window moved by a share of its width, and widened by a factor.
+    shift(by, spread, [low, high] = window) {
+      const half = ((high - low) / 2) * spread;
+      const level = (low + high) / 2 + by * (high - low);
+      setWindow(level - half, level + half);
+    },
+    // drag: the press and what was shown then; ended: whether this is its last point.
+    dragTo(drag, [px, py], ended) {
+      const [dx, dy] = [px - drag.point[0], py - drag.point[1]];
+      drag.moved ||= Math.hypot(dx, dy) > STILL;
+      if (!drag.moved) return;
+      if (state.tool === "pan") this.pan(drag.centre, -dx, dy);
+      else if (state.tool === "window") this.shift(-dy * DRAG_SHARE, Math.exp(dx * DRAG_SHARE * 2), drag.window);
+      else change(withDrag(state, axis, inSpace(drag.at), inSpace(image.toPlane(px, py)), SAME_PX / image.scale, ended));
+    },
+    // What a key does, nothing for others.
+    keyAction(event) {
+      const { clientWidth: width, clientHeight: height } = event.currentTarget;
+      const zoom = (factor) => this.zoomAt(width / 2, height / 2, factor);
+      return {
+        ArrowLeft: () => this.step(-1, 0, event),
+        ArrowRight: () => this.step(1, 0, event),
+        ArrowUp: () => this.step(0, 1, event),
+        ArrowDown: () => this.step(0, -1, event),
+        "+": () => zoom(STEP),
+        "=": () => zoom(STEP),
+        "-": () => zoom(1 / STEP),
+        0: () => change({ views: { ...state.views, [axis]: WHOLE } }),
+        a: () => change({ window: null }),
+        ",": () => this.shift(-KEY_SHARE, 1),
+        ".": () => this.shift(KEY_SHARE, 1),
+        "[": () => this.shift(0, 1 - 2 * KEY_SHARE),
+        "]": () => this.shift(0, 1 + 2 * KEY_SHARE),
+        PageUp: () => this.moveSlice(1),
+        PageDown: () => this.moveSlice(-1),
+        Enter: draws(state) && (() => this.mark([cursor[first], cursor[second]])),
+        Escape: state.draft && (() => change({ draft: null })),
+      }[event.key];
+    },
+  };
+}
+
+// image: as for ImageView.show; actions: see actionsOf.
+export function Tile({ tile, words, image: { plane, ...look }, actions }) {
+  const [canvas, view, pressed] = [useRef(null), useRef(null), useRef(null)];
   useLayoutEffect(() => {
     view.current = new ImageView(canvas.current);
-    new Pointing(canvas.current, view.current, actions);
     return () => view.current.close();
   }, []);
-  useLayoutEffect(() => {
-    actions.current = actionsOf(view.current);
-    view.current.show(plane, look);
+  useLayoutEffect(() => view.current.show(plane, look));
+  const { state } = actions;
+  const act = () => actionsOf(tile, view.current, actions);
+  const pointers = usePointers({
+    press(point) {
+      const { current: image } = view;
+      pressed.current = point && { point, moved: false, at: image.toPlane(...point), centre: image.centre, window: actions.window };
+    },
+    hover: (point) => act().hover(point),
+    drag: (point) => pressed.current && act().dragTo(pressed.current, point, false),
+    pinch: (factor, point) => act().zoomAt(...point, factor),
+    release(point) {
+      const { current: drag } = pressed;
+      if (drag && !drag.moved) {
+        act().moveTo(...drag.at);
+        if (state.tool in MEASURES) act().mark(drag.at);
+      } else if (drag && draws(state)) act().dragTo(drag, point, true);
+      pressed.current = null;
+    },
+    cancel() {
+      pressed.current = null;
+    },
   });
-  const label = `Image of ${words}${title && `, ${title}`}; arrow keys move the cursor`;
+  const onKeyDown = (event) => {
+    const action = event.ctrlKey || event.altKey || event.metaKey ? null : act().keyAction(event);
+    if (!action) return;
+    action();
+    event.preventDefault();
+  };
+  const onWheel = (event) => {
+    event.preventDefault();
+    act().zoomAt(event.offsetX, event.offsetY, WHEEL ** -event.deltaY);
+  };
+  const grip = state.tool !== "pan" || state.views[tile.axis].zoom > 1;
+  const label = `Image of ${words}${tile.title && `, ${tile.title}`}; arrow keys move the cursor`;
   return html`<figure class="tile">
-    <canvas ref=${canvas} class=${grip ? "plane grip" : "plane"} tabindex="0" role="application" aria-roledescription="image" aria-label=${label}></canvas>
-    ${title && html`<figcaption>${title}</figcaption>`}
+    <canvas ref=${canvas} class=${grip ? "plane grip" : "plane"} tabindex="0" role="application" aria-roledescription="image" aria-label=${label}
+      onKeyDown=${onKeyDown} onWheel=${onWheel} ...${pointers}></canvas>
+    ${tile.title && html`<figcaption>${tile.title}</figcaption>`}
   </figure>`;
 }

@@ -1,19 +1,17 @@
 // Results on canvases with one range of colours and one cursor: quantities, planes, window, profile, region.
-import { Alert, html, useEffect, useLater, useMemo, useReducer, useRef, useState } from "../parts/view.js";
+import { Alert, html, useEffect, useLater, useMemo, useRead, useReducer, useState } from "../parts/view.js";
 import { ColourBar } from "./colour_bar.js";
 import { ChoiceBar, Keys, Slices, Swipe, Tools, Window } from "./controls.js";
-import { AXES, Planes } from "./field.js";
+import { AXES, shownPlane } from "./field.js";
 import { Measures } from "./measures_panel.js";
 import { robustLimits } from "./measures.js";
-import { flat, inPlane, MEASURES, valueOf, withDrag, withPoint } from "./measuring.js";
+import { flat, inPlane, MEASURES, valueOf } from "./measuring.js";
 import { FADED, QUANTITIES, shownOf } from "./quantities.js";
 import { Readout } from "./readout.js";
 import { MODES, queryOfState } from "./state.js";
 import { Tile } from "./tile.js";
 
 const SAVE_MS = 250;
-// Within as many pixels of the page a point is the same one.
-const SAME_PX = 7;
 
 const fades = (panes, quantity) => panes.length === 1 && panes[0].stored.includes("uncertainty") && FADED.includes(quantity);
 
@@ -32,24 +30,24 @@ function layoutOf(panes, { planes, axis, mode, other }, axes) {
 }
 
 // The limits of the colours that suit the values.
-function limitsOf(planes, tiles, cursor, comparing) {
-  const { limits, symmetric, least } = QUANTITIES[planes.quantity];
-  const arrays = comparing ? tiles.map((tile) => planes.shown(tile, cursor).values) : planes.fields.map((field) => field.values);
+function limitsOf({ limits, symmetric, least }, fields, tiles, cursor, comparing) {
+  const arrays = comparing ? tiles.map((tile) => shownPlane(fields, tile, cursor).values) : fields.map((field) => field.values);
   const [low, high] = robustLimits(arrays);
   const reach = Math.max(Math.abs(low), Math.abs(high));
   return comparing || symmetric ? [-reach, reach] : limits ?? [least ?? low, high];
 }
 
-// The values of the quantity of the state, read anew when it changes: { planes, words, error }; words: how far they are read, "" once they are.
-function usePlanes(panes, state) {
-  const [found, setFound] = useState({ planes: null, words: "", error: null });
+// The values of the quantity of the state, read anew when it changes: { read, words, error }. read: { quantity, fields, spread }, a field for each
+// pane and the standard deviations of the only one, or null; words: how far they are read, "" once they are.
+function useFields(panes, state) {
+  const [found, setFound] = useState({ read: null, words: "", error: null });
   const { quantity } = state;
   const fading = state.fade && fades(panes, quantity);
   useEffect(() => {
     let newest = true;
     const say = (part) => newest && setFound((before) => ({ ...before, ...part }));
     const shares = panes.map(() => 0);
-    async function read() {
+    async function readAll() {
       say({ words: "Reading the values", error: null });
       const fields = await Promise.all(panes.map(({ values }, k) => values.field(quantity, (share) => {
         shares[k] = share;
@@ -57,15 +55,14 @@ function usePlanes(panes, state) {
       })));
       const spread = fading ? await panes[0].values.field("uncertainty") : null;
       if (!newest) return;
-      const planes = new Planes(quantity, fields, spread);
-      const { main } = planes;
+      const [main] = fields;
       state.counted = main.uneven;
       state.cursor ??= [0, 1, 2].map((k) => (k < main.dimension ? main.position(AXES[k], Math.floor(main.shape[k] / 2)) : 0));
       if (!main.axes.includes(state.axis)) state.axis = "z";
       if (panes.length > 1 || main.axes.length === 1) state.planes = false;
-      say({ planes, words: "" });
+      say({ read: { quantity, fields, spread }, words: "" });
     }
-    read().catch((error) => say({ words: "", error }));
+    readAll().catch((error) => say({ words: "", error }));
     return () => {
       newest = false;
     };
@@ -73,80 +70,28 @@ function usePlanes(panes, state) {
   return found;
 }
 
-// A stored quantity beside a region of the speed, at the shown plane: read once, and then drawn. The function gives null before that.
-function useBesides(pane, planes, state, redraw) {
-  const besides = useRef({});
-  return (name) => {
-    if (!state.region || planes.quantity !== "speed" || !pane?.stored.includes(name)) return null;
-    besides.current[name] ??= pane.values.field(name).then((field) => {
-      besides.current[name] = field;
-      redraw();
-    }, () => {});
-    const field = besides.current[name];
-    return field.nearest ? planes.planeOf(field, name, state.axis, state.cursor) : null;
-  };
-}
-
-// What pointers and keys on the canvas of a tile do, see pointing.js.
-function actionsOf({ axis, key }, view, { main, state, window, change, setWindow, setHover }) {
-  const [first, second] = inPlane(axis);
-  const moveTo = (places) => {
-    for (const [k, place] of places) state.cursor[k] = main.position(AXES[k], main.nearest(AXES[k], place));
-    change({});
-  };
-  // A point of the plane at the cursor, [x, y, z].
-  const inSpace = ([a, b]) => state.cursor.map((place, k) => (k === first ? a : k === second ? b : place));
-  return {
-    state,
-    window,
-    setWindow,
-    get view() {
-      return state.views[axis] ?? { centre: null, zoom: 1 };
-    },
-    get cursor() {
-      return [state.cursor[first], state.cursor[second]];
-    },
-    setView: (centre, zoom) => change({ views: { ...state.views, [axis]: { centre, zoom } } }),
-    hover(point) {
-      const place = point && view.toPlane(...point);
-      setHover({ at: place && { key, axis, place, other: view.showsOther(place[0]) }, spoken: false });
-    },
-    setCursor: (x, y) => moveTo([[first, x], [second, y]]),
-    moveCursor(da, db) {
-      setHover({ at: null, spoken: true });
-      moveTo([[first, state.cursor[first] + da * main.spacing[first]], [second, state.cursor[second] + db * main.spacing[second]]]);
-    },
-    moveSlice(by) {
-      const k = AXES.indexOf(axis);
-      const index = main.nearest(axis, state.cursor[k]) + by;
-      if (index >= 0 && index < main.count(axis)) state.cursor[k] = main.position(axis, index);
-      change({});
-    },
-    mark: (point) => change(withPoint(state, axis, inSpace(point), SAME_PX / view.scale)),
-    drag: (from, to, ended) => change(withDrag(state, axis, inSpace(from), inSpace(to), SAME_PX / view.scale, ended)),
-    cancel: () => change({ draft: null }),
-    automatic: () => change({ window: null }),
-    reset() {
-      const { [axis]: _, ...views } = state.views;
-      change({ views });
-    },
-  };
+// The plane of a stored quantity beside a region of the speed; null before it is read, and where there is none.
+function useBeside(name, panes, quantity, { region, axis, cursor }) {
+  const wanted = region !== null && quantity === "speed" && panes.length === 1 && panes[0].stored.includes(name);
+  const [field] = useRead(() => (wanted ? panes[0].values.field(name) : null), undefined, wanted);
+  return field?.planeAt(axis, cursor) ?? null;
 }
 
 // The images and what is measured in them, once there are values.
-function Body({ planes, panes, state, change, redraw }) {
+function Body({ read, panes, state, change }) {
   const [{ at: hover, spoken }, setHover] = useState({ at: null, spoken: false });
-  const { main } = planes;
+  const { fields, spread } = read;
+  const [main] = fields;
   const { cursor } = state;
   const comparing = panes.length > 1 && state.mode === "difference";
-  const quantity = QUANTITIES[planes.quantity];
+  const quantity = QUANTITIES[read.quantity];
   const tiles = layoutOf(panes, state, main.axes).map((tile) => ({ ...tile, key: `${tile.number} ${tile.axis} ${tile.minus}` }));
   // Measured anew for another arrangement, and not for another slice.
-  const automatic = useMemo(() => limitsOf(planes, tiles, cursor, comparing), [planes, state.mode, state.other, comparing && state.axis]);
+  const automatic = useMemo(() => limitsOf(quantity, fields, tiles, cursor, comparing), [read, state.mode, state.other, comparing && state.axis]);
   const [low, high] = state.window ?? automatic;
   const map = state.map ?? (comparing ? "RdBu_r" : quantity.map);
-  const beside = useBesides(panes.length === 1 ? panes[0] : null, planes, state, redraw);
-  const truth = beside("truth");
+  const truth = useBeside("truth", panes, read.quantity, state);
+  const deviations = useBeside("uncertainty", panes, read.quantity, state);
 
   function setWindow(from, to) {
     if (Number.isFinite(from) && Number.isFinite(to) && to - from > 1e-9 * Math.max(Math.abs(from), Math.abs(to), 1e-30)) change({ window: [from, to] });
@@ -178,18 +123,18 @@ function Body({ planes, panes, state, change, redraw }) {
       ...(axis === state.axis && { profile: state.profile, region: state.region }),
       measures: marksOf(tile),
     };
-    const other = tile.other ? planes.plane(tile.other, axis, cursor) : null;
-    const look = state.views[axis] ?? { centre: null, zoom: 1 };
-    return { plane: planes.shown(tile, cursor), other, swipe: state.swipe, deviations: planes.deviations(axis, cursor), low, high, map, marks, ...look };
+    const other = tile.other ? fields[tile.other].planeAt(axis, cursor) : null;
+    const fading = spread?.planeAt(axis, cursor) ?? null;
+    return { plane: shownPlane(fields, tile, cursor), other, swipe: state.swipe, deviations: fading, low, high, map, marks, ...state.views[axis] };
   }
 
   const curves = tiles.filter((tile) => tile.axis === state.axis).flatMap((tile) => [
-    { title: tile.other ? panes[0].title : tile.title || panes[0].title, plane: planes.shown(tile, cursor) },
-    ...(tile.other ? [{ title: panes[tile.other].title, plane: planes.plane(tile.other, tile.axis, cursor) }] : []),
+    { title: tile.other ? panes[0].title : tile.title || panes[0].title, plane: shownPlane(fields, tile, cursor) },
+    ...(tile.other ? [{ title: panes[tile.other].title, plane: fields[tile.other].planeAt(tile.axis, cursor) }] : []),
   ]);
   const pointed = tiles.find((tile) => tile.key === hover?.key);
   const readAt = pointed ? hover.place : inPlane(tiles[0].axis).map((k) => cursor[k]);
-  const shared = { main, state, window: [low, high], change, setWindow, setHover };
+  const actions = { main, state, window: [low, high], change, setWindow, setHover };
   const axes = [...new Set(tiles.map((tile) => tile.axis))].filter((axis) => main.count(axis) > 1);
   const moveSlice = (axis, index) => {
     cursor[AXES.indexOf(axis)] = main.position(axis, index);
@@ -199,23 +144,21 @@ function Body({ planes, panes, state, change, redraw }) {
   return html`<div class="viewer-body">
     <div class="viewer-images">
       <div class="tiles" data-count=${tiles.length}>
-        ${tiles.map((tile) => html`<${Tile} key=${tile.key} title=${tile.title} words=${quantity.words} image=${imageOf(tile)}
-          grip=${state.tool !== "pan" || state.views[tile.axis]?.zoom > 1} actionsOf=${(view) => actionsOf(tile, view, shared)} />`)}
+        ${tiles.map((tile) => html`<${Tile} key=${tile.key} tile=${tile} words=${quantity.words} image=${imageOf(tile)} actions=${actions} />`)}
       </div>
       ${state.mode === "swipe" && panes.length > 1 && html`<${Swipe} panes=${panes} other=${state.other} swipe=${state.swipe} change=${change} />`}
       <${Slices} main=${main} axes=${axes} axis=${main.axes.length > 1 && !state.planes ? state.axis : null} cursor=${cursor}
         onMove=${moveSlice} onAxis=${(axis) => change({ axis })} />
-      <${Readout} planes=${planes} panes=${panes} cursor=${cursor} tile=${pointed ?? tiles[0]} place=${readAt} other=${pointed?.other && hover.other}
+      <${Readout} quantity=${quantity} fields=${fields} panes=${panes} cursor=${cursor} tile=${pointed ?? tiles[0]} place=${readAt} other=${pointed?.other && hover.other}
         spoken=${spoken} apart=${panes.length > 1 && !comparing} />
       <${ColourBar} low=${low} high=${high} map=${map} words=${words} />
     </div>
     <div class="viewer-side">
       <${Tools} tool=${state.tool} change=${change} />
-      <${Window} low=${low} high=${high} map=${map} fade=${state.fade} planes=${state.planes} fades=${fades(panes, planes.quantity)}
+      <${Window} low=${low} high=${high} map=${map} fade=${state.fade} planes=${state.planes} fades=${fades(panes, read.quantity)}
         sliced=${panes.length === 1 && main.axes.length > 1} setWindow=${setWindow} change=${change} />
       <${Measures} curves=${curves} state=${state} quantity=${quantity} beside=${truth ? [{ title: QUANTITIES.truth.title, plane: truth }] : []}
-        deviations=${beside("uncertainty")} detail=${panes[0].detail} change=${change}
-        planeOf=${(axis, point) => planes.sliceAt(axis, point[AXES.indexOf(axis)])} />
+        deviations=${deviations} detail=${panes[0].detail} change=${change} main=${main} />
       <${Keys} />
     </div>
   </div>`;
@@ -229,9 +172,9 @@ export function Viewer({ panes, state, keep, ...more }) {
   state.other = Math.max(1, Math.min(state.other, panes.length - 1));
   const [, redraw] = useReducer((count) => count + 1, 0);
   const later = useLater();
-  const { planes, words, error } = usePlanes(panes, state);
+  const { read, words, error } = useFields(panes, state);
   const save = () => later(() => keep(queryOfState(state)), SAVE_MS);
-  useEffect(save, [planes]);
+  useEffect(save, [read]);
   const change = (part) => {
     Object.assign(state, part);
     redraw();
@@ -246,6 +189,6 @@ export function Viewer({ panes, state, keep, ...more }) {
     </div>
     <${Alert} error=${error} />
     <p class="loading" role="status" hidden=${!words}>${words}</p>
-    ${planes && html`<${Body} planes=${planes} panes=${panes} state=${state} change=${change} redraw=${redraw} />`}
+    ${read && html`<${Body} read=${read} panes=${panes} state=${state} change=${change} />`}
   </section>`;
 }
