@@ -12,9 +12,9 @@ const HISTORY_MS = 3000;
 
 export const isUnfinished = ({ state }) => ["queued", "running", "cancelling"].includes(state);
 
-// [jobs, error, refresh, change]: the records of read(), null before the first ones. onJobs(jobs) is called whenever one has changed;
-// change(address, method) changes one and reads them again.
-export function useJobs({ read, historyMs = HISTORY_MS, onJobs = () => {} }) {
+// [jobs, error, refresh, change]: the records of read(), null before the first ones, read anew for another key. onJobs(jobs) is called whenever
+// one has changed; change(address, method) changes one and reads them again.
+export function useJobs({ read, key = "", historyMs = HISTORY_MS, onJobs = () => {} }) {
   const [, draw] = useReducer((count) => count + 1, 0);
   const [live, shown] = [useRef(false), useShown()];
   // Of jobs that read() does not return.
@@ -31,7 +31,7 @@ export function useJobs({ read, historyMs = HISTORY_MS, onJobs = () => {} }) {
     if (!live.current || problem) return found?.some(isUnfinished) ? BUSY_MS : IDLE_MS;
     return found?.some((job) => job.ahead) ? HISTORY_MS : null;
   }
-  const [jobs, error, refresh, readIn] = useRead(readAll, waitOf);
+  const [jobs, error, refresh, readIn] = useRead(readAll, { waitOf, key, settle: 0 });
   const current = useNewest(jobs);
 
   function onChange({ id, state, progress }) {

@@ -4,7 +4,7 @@ import { counted, inTime } from "../parts/amounts.js";
 import { request } from "../parts/api.js";
 import { Filters, ListPages, olderOf } from "../parts/lists.js";
 import { loadTitles, titleOfJob } from "../parts/titles.js";
-import { Alert, Button, Choice, Field, html, useEffect, useRef, useState } from "../parts/view.js";
+import { Alert, Button, Choice, Field, html, useNewest, useRef, useState } from "../parts/view.js";
 import { useJobs } from "./followed_jobs.js";
 import { duration, inWords, moment } from "./job_words.js";
 import { Thumbnail } from "./thumbnail.js";
@@ -76,33 +76,25 @@ function JobFilters({ words, query, onChange, hidden }) {
 // query: filters and page, of the address; words: the choices of the filters by their names.
 export function JobTable({ query: first, words }) {
   const [query, setQuery] = useState(pick(first, ["batch", "text", "state", "kind", "before"]));
-  const newest = useRef(query);
   const [older, setOlder] = useState("");
-
-  async function read() {
-    for (;;) {
-      const asked = newest.current;
-      const { jobs, next } = await request(`/v1/jobs?${new URLSearchParams([...asked, ["limit", PAGE]])}`);
-      await loadTitles(jobs);
+  const newest = useNewest(query);
+  const [jobs, error, , act] = useJobs({
+    key: query.toString(),
+    async read() {
+      const { jobs: found, next } = await request(`/v1/jobs?${new URLSearchParams([...query, ["limit", PAGE]])}`);
+      await loadTitles(found);
       // The filters may have been changed in the meantime.
-      if (asked !== newest.current) continue;
-      setOlder(olderOf(next));
-      return jobs;
-    }
-  }
-
-  const [jobs, error, refresh, act] = useJobs({ read });
+      if (query === newest.current) setOlder(olderOf(next));
+      return found;
+    },
+  });
 
   function change(filters) {
     // The page of a batch stays that of the batch.
     if (query.has("batch")) filters.set("batch", query.get("batch"));
     keepQuery(filters);
-    newest.current = filters;
     setQuery(filters);
   }
-  useEffect(() => {
-    if (jobs) refresh();
-  }, [query]);
 
   const none = jobs?.length === 0;
   const filtered = pick(query, ["text", "state", "kind"]).size > 0;

@@ -99,7 +99,7 @@ function usePreview(job) {
       last.current = { key, record: found ?? last.current.record };
     }
     return last.current.record;
-  }, () => PREVIEW_MS);
+  }, { waitOf: () => PREVIEW_MS });
   return record;
 }
 

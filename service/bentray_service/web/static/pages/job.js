@@ -25,7 +25,7 @@ function rowOf({ time, status, error, seconds }, number) {
 // Followed until the message is accepted or given up; nothing for a job without a webhook.
 function WebhookPanel({ id }) {
   const ended = (job) => job && (!job.webhook || ["delivered", "failed"].includes(job.webhook.state));
-  const [job] = useRead(() => request(`/v1/jobs/${id}`), (found) => (ended(found) ? null : FRESH_MS));
+  const [job] = useRead(() => request(`/v1/jobs/${id}`), { waitOf: (found) => (ended(found) ? null : FRESH_MS) });
   if (!job?.webhook) return null;
   const { url, state, attempts, due, message } = job.webhook;
   const title = html`Webhook<span class=${`state ${COLOURS[state] ?? state}`}>${state}</span>`;

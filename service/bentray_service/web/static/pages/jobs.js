@@ -28,7 +28,7 @@ function Batch({ batch, act }) {
 function Batches({ id }) {
   const read = async () => (id ? [await request(`/v1/batches/${id}`)] : (await request(`/v1/batches?limit=${SHOWN}`)).batches);
   const busy = (batches) => batches?.some(isUnfinished);
-  const [batches, error, refresh] = useRead(read, (found) => (busy(found) ? BUSY_MS : IDLE_MS));
+  const [batches, error, refresh] = useRead(read, { waitOf: (found) => (busy(found) ? BUSY_MS : IDLE_MS) });
   const [failure, attempt] = useAct();
   const act = (address) => attempt(async () => {
     await request(address, { method: "POST" });

@@ -6,7 +6,7 @@ import { KeyLink } from "../parts/key.js";
 import { planOf, waitInWords } from "../jobs/job_words.js";
 import { PlainField } from "../parts/settings_fields.js";
 import { load, titleOf } from "../parts/titles.js";
-import { html, useAsked, useEffect, useRef, useState } from "../parts/view.js";
+import { html, useEffect, useRead, useReducer, useRef, useState } from "../parts/view.js";
 import { glassOf, queryOf, shownBy } from "../parts/views.js";
 import { Histogram } from "../scenes/histogram.js";
 import { CAMERA, FULL_PX, PREVIEW_PX, rounded, ScenePage, useScene } from "../scenes/scene.js";
@@ -88,30 +88,20 @@ function turntableOf(volume, { iso, index, ...rest }, frames) {
 
 // The histogram of a volume and its default iso-value; read() reads it once: after the first picture, whose worker has filtered the volume.
 function useHistogram(volume, onError) {
-  const [histogram, error, ask] = useAsked();
-  const counted = useRef("");
-  function read() {
-    if (!volume || counted.current === volume.id) return;
-    counted.current = volume.id;
-    ask(async () => ({ ...await request(volume.links.histogram), volume: volume.id }));
-  }
+  const [counted, setCounted] = useState(null);
+  const [histogram, error] = useRead(() => counted && request(counted.links.histogram), { key: counted?.id });
   useEffect(() => error && onError(error), [error]);
-  return [histogram?.volume === volume?.id ? histogram : null, read];
+  return [counted?.id === volume?.id ? histogram : null, () => setCounted(volume ?? null)];
 }
 
 // The time of a turntable in words, which the camera does not change: [words, plan, forget]; plan(job) asks for it unless it is known, and
 // again after forget().
 function usePlan() {
-  const [estimate, error, ask] = useAsked(PLAN_MS);
-  const planned = useRef("");
-  function plan(job) {
-    const key = JSON.stringify({ ...job, settings: { ...job.settings, ...Object.fromEntries(CAMERA.map((name) => [name, 0])) } });
-    if (key !== planned.current) ask(() => planOf(job));
-    planned.current = key;
-  }
-  const forget = () => {
-    planned.current = "";
-  };
+  const [job, plan] = useState(null);
+  const [forgotten, forget] = useReducer((count) => count + 1, 0);
+  const still = Object.fromEntries(CAMERA.map((name) => [name, 0]));
+  const key = JSON.stringify([forgotten, job && { ...job, settings: { ...job.settings, ...still } }]);
+  const [estimate, error] = useRead(() => job && planOf(job), { key, settle: PLAN_MS });
   return [error?.message ?? (estimate ? `Turntable: ${waitInWords(estimate)}` : ""), plan, forget];
 }
 
@@ -195,10 +185,7 @@ function Rendering({ volumes, id, query, fields }) {
   // The time is asked for again once a job has ended.
   function onJobs(jobs) {
     const now = jobs.filter((job) => job.finished).length;
-    if (ended.current !== null && now !== ended.current) {
-      forgetPlan();
-      if (volume && form.current.checkValidity()) plan(turntable());
-    }
+    if (ended.current !== null && now !== ended.current) forgetPlan();
     ended.current = now;
   }
   const slide = (value) => {

@@ -7,7 +7,7 @@ import { KeyLink, Picture } from "../parts/key.js";
 import { planInWords, planOf, waitInWords } from "../jobs/job_words.js";
 import { readSettings, SettingsForm, useSettings } from "../parts/settings_form.js";
 import { titleOf } from "../parts/titles.js";
-import { Alert, Button, Facts, Form, html, Section, useAct, useAsked, useEffect, useRead, useRef, useState } from "../parts/view.js";
+import { Alert, Button, Facts, Form, html, Section, useAct, useEffect, useRead, useReducer, useRef, useState } from "../parts/view.js";
 import { Elements, inWordsOf } from "../scans/scan_drawing.js";
 import { ScanEditor } from "../scans/scan_edit.js";
 import { factRows, Quality } from "../scans/scan_facts.js";
@@ -26,7 +26,7 @@ function factsOf(scan) {
 // A button with the time that its settings take; a plan that is refused says why. changes: of jobs, which change the time.
 function Preset({ id, name, title, words, scan, changes }) {
   const job = { kind: "reconstruction", dataset: scan.id, settings: PRESETS[name] };
-  const [estimate, error] = useRead(() => planOf(job), undefined, changes);
+  const [estimate, error] = useRead(() => planOf(job), { key: changes });
   return html`<button id=${id} type="submit" value=${name}>${title}
     <small id=${`${name}-words`}>${words}</small>
     <small class="time" id=${`${name}-time`} title=${estimate?.basis}>${estimate ? waitInWords(estimate) : error?.message ?? "…"}</small></button>`;
@@ -34,18 +34,18 @@ function Preset({ id, name, title, words, scan, changes }) {
 
 // The plan of the settings in the form, in words: [words, later]; later() asks for it a moment after a change.
 function usePlan(scan, form) {
-  const [estimate, error, ask] = useAsked(PLAN_MS);
+  const [asked, later] = useReducer((count) => count + 1, 0);
   const [words, setWords] = useState("");
-  async function plan() {
-    const settings = form.changed(false);
+  const [estimate, error] = useRead(async () => {
+    const settings = asked ? form.changed(false) : null;
     return settings && planOf({ kind: "reconstruction", dataset: scan.id, settings });
-  }
+  }, { key: asked, settle: PLAN_MS });
   useEffect(() => {
     // A setting that the service refuses is told at its field before anything is started.
     if (error) setWords(form.refuse(error.problem ?? {}, false) ? "" : error.message);
     else setWords(estimate ? `${planInWords(estimate)}. ${estimate.basis}` : "");
   }, [estimate, error]);
-  return [words, () => ask(plan)];
+  return [words, later];
 }
 
 // from: the id of a job whose settings are run again with changes; changes: of jobs; onStarted() is called after a start.
@@ -103,7 +103,7 @@ function Run({ scan, from, changes, onStarted }) {
 function About({ scan, geometry, geometryError, element, openWater, onChange }) {
   const address = `/v1/datasets/${scan.id}/quality`;
   const water = scan.water_temperature_c ?? "";
-  const [report, error] = useRead(() => request(address), undefined, water);
+  const [report, error] = useRead(() => request(address), { key: water });
   const [opened, setOpened] = useState(false);
   const [waterError, act] = useAct();
   const useWater = (celsius) => act(async () => onChange(await send("PATCH", `/v1/datasets/${scan.id}`, { water_temperature_c: celsius })));
@@ -147,7 +147,7 @@ function Scan({ scan: first, from }) {
   const [element, setElement] = useState(null);
   const [refresh, openWater] = [useRef(null), useRef(null)];
   const water = scan.water_temperature_c ?? "";
-  const [geometry, geometryError] = useRead(() => request(`/v1/datasets/${scan.id}/geometry`), undefined, water);
+  const [geometry, geometryError] = useRead(() => request(`/v1/datasets/${scan.id}/geometry`), { key: water });
   useEffect(() => {
     document.title = `${titleOf(scan)} – Bentray`;
   }, [scan]);

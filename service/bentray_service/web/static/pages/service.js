@@ -91,7 +91,7 @@ function Panel({ name, title, error, children }) {
 
 function Service({ access }) {
   const [about] = useRead(description);
-  const [cluster, clusterError] = useRead(() => request("/v1/cluster"), () => FRESH_MS);
+  const [cluster, clusterError] = useRead(() => request("/v1/cluster"), { waitOf: () => FRESH_MS });
   const [storage, storageError] = useRead(() => request("/v1/access/storage"));
   const [listed, keysError] = useRead(() => request("/v1/access/keys"));
   const who = access.how === "open" ? "open to this machine" : `tenant ${access.tenant} (${access.scopes.join(", ")})`;

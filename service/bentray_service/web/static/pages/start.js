@@ -6,7 +6,7 @@ import { description } from "../parts/description.js";
 import { DropZone } from "../parts/drop_zone.js";
 import { Filters, ListPages, olderOf } from "../parts/lists.js";
 import { titleOf } from "../parts/titles.js";
-import { Alert, Button, Choice, Facts, Field, Form, html, Section, useAct, useAsked, useEffect, useRef, useShown, useState } from "../parts/view.js";
+import { Alert, Button, Choice, Facts, Field, Form, html, Section, useAct, useRead, useRef, useShown, useState } from "../parts/view.js";
 
 // Scans on one page of the list.
 const PAGE_LENGTH = 25;
@@ -65,11 +65,10 @@ function Sample() {
 // changes: a number that grows when the list is to be read again.
 function Scans({ first, changes }) {
   const [query, setQuery] = useState(first);
-  const [found, error, ask] = useAsked();
-  useEffect(() => ask(async () => {
+  const [found, error] = useRead(async () => {
     const answer = await request(`/v1/datasets?${new URLSearchParams([...query, ["limit", PAGE_LENGTH]])}`);
     return { ...answer, query };
-  }), [query, changes]);
+  }, { key: `${query} ${changes}`, settle: 0 });
   const search = (changed) => {
     keepQuery(changed);
     setQuery(changed);

@@ -30,7 +30,7 @@ function percent(share) {
 
 // The errors of a field in words, lengths in per cent of the edge of its unit cube. address: of its record.
 function Accuracy({ address, onError }) {
-  const [record, error] = useRead(() => request(address), undefined, address);
+  const [record, error] = useRead(() => request(address), { key: address });
   useEffect(() => error && onError(error), [error]);
   if (!record) return null;
   const { errors, sizes, seconds, settings } = record;

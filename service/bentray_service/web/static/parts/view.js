@@ -107,14 +107,17 @@ export function useAct() {
   return [error, act, setError];
 }
 
+const NOTHING = { value: null, error: null };
+
 // [value, error, refresh, readIn] of read(), which is read again after waitOf(value, error) milliseconds while the tab is seen, null: not
-// again; and anew for another key. readIn(milliseconds): again after a time, unless that is done earlier anyway.
-export function useRead(read, waitOf = () => null, key = "") {
-  const [{ value, error }, setState] = useState({ value: null, error: null });
+// again; and anew for another key, before whose value there is none. settle: then it is read that many milliseconds after the last change of the
+// key, and the value before stays until then. readIn(milliseconds): again after a time, unless that is done earlier anyway.
+export function useRead(read, { waitOf = () => null, key = "", settle = null } = {}) {
+  const [{ value, error }, setState] = useState(NOTHING);
   const reader = useRef(null);
   useEffect(() => {
     let [closed, timer, due, reading] = [false, 0, Infinity, null];
-    let [last, problem] = [null, null];
+    let [last, problem] = [settle === null ? null : value, null];
     async function readNow() {
       try {
         [last, problem] = [await read(), null];
@@ -146,31 +149,16 @@ export function useRead(read, waitOf = () => null, key = "") {
     };
     const onVisible = () => document.hidden || waitOf(last, problem) === null || reader.current.refresh();
     document.addEventListener("visibilitychange", onVisible);
-    reader.current.refresh();
+    if (settle) reader.current.readIn(settle);
+    else reader.current.refresh();
     return () => {
       closed = true;
       clearTimeout(timer);
       document.removeEventListener("visibilitychange", onVisible);
-      setState({ value: null, error: null });
+      if (settle === null) setState(NOTHING);
     };
   }, [key]);
   return [value, error, () => reader.current.refresh(), (milliseconds) => reader.current.readIn(milliseconds)];
-}
-
-// [value, error, ask]: what the newest ask(read) gave. read() begins some time after the last call; what a newer one overtakes is forgotten.
-export function useAsked(milliseconds = 0) {
-  const [{ value, error }, setState] = useState({ value: null, error: null });
-  const number = useRef(0);
-  const later = useLater();
-  const ask = (read) => {
-    number.current += 1;
-    const mine = number.current;
-    later(async () => {
-      const answer = await read().then((found) => ({ value: found, error: null }), (problem) => ({ error: problem }));
-      if (mine === number.current) setState((before) => ({ ...before, ...answer }));
-    }, milliseconds);
-  };
-  return [value, error, ask];
 }
 
 // later(work, milliseconds) puts off the work that waited before; none is done once the component is gone.

@@ -1,6 +1,6 @@
 // The shot of a scan: which emission, its traces on a canvas, and the arrivals of one receiver as text.
 import { request } from "../parts/api.js";
-import { Alert, Choice, Facts, Field, html, Section, useAsked, useEffect, useState } from "../parts/view.js";
+import { Alert, Choice, Facts, Field, html, Section, useEffect, useRead, useState } from "../parts/view.js";
 import { Traces } from "./traces.js";
 
 // Between the last movement of the slider and the request.
@@ -48,8 +48,7 @@ export function Shot({ scan, hasWater, onEmission }) {
   const [quantity, setQuantity] = useState("object");
   const [cursor, setCursor] = useState(0);
   const address = `/v1/datasets/${scan.id}/traces?emission=${emission}&slice=${slice}&quantity=${quantity}`;
-  const [shot, error, ask] = useAsked(WAIT_MS);
-  useEffect(() => ask(() => request(address)), [address]);
+  const [shot, error] = useRead(() => request(address), { key: address, settle: WAIT_MS });
   useEffect(() => shot && onEmission(shot.element), [shot]);
   const receiver = shot ? Math.min(cursor, shot.receivers - 1) : 0;
 

@@ -15,11 +15,11 @@ const NEWEST = 0.2;
 export const rateOf = (rate) => ` · preview${rate ? ` · ${Math.round(rate)} frames/s` : ""}`;
 
 // Draws pictures of the service on a canvas. The newest view wins: a preview under way is still shown, since frames would
-// never arrive otherwise, unless a newer one was; a full picture under way is cancelled. After each picture onShown is called
-// with { quality, rate }: previews per second, 0 for the first one of a motion.
+// never arrive otherwise, unless a newer one was; a full picture under way is cancelled. handlers: { current } with onShown, called after each
+// picture with { quality, rate }: previews per second, 0 for the first one of a motion; and onError(error), null after a picture.
 export class PictureStream {
-  constructor(canvas, { onShown, onError }) {
-    Object.assign(this, { canvas, onShown, onError, underWay: new Set(), wanted: null, views: 0, shown: 0, waitUntil: 0, timer: 0 });
+  constructor(canvas, handlers) {
+    Object.assign(this, { canvas, handlers, underWay: new Set(), wanted: null, views: 0, shown: 0, waitUntil: 0, timer: 0 });
     // The time of the last picture, and of previews: when the last one came, and the mean interval; ms.
     Object.assign(this, { lastMs: Infinity, lastPreview: -Infinity, interval: 0 });
   }
@@ -92,7 +92,7 @@ export class PictureStream {
         this.waitUntil = performance.now() + Math.min(1000 * Number(error.response.headers.get("Retry-After") || 1), MAX_WAIT_MS);
       } else if (!signal.aborted) {
         view.shown = "full";
-        if (this.wanted === view) this.onError(error);
+        if (this.wanted === view) this.handlers.current.onError(error);
       }
     }
     this.underWay.delete(request);
@@ -103,8 +103,8 @@ export class PictureStream {
     this.shown = view.number;
     view.shown = quality;
     Object.assign(this.canvas.dataset, { address: view[quality], quality, source, pictures: Number(this.canvas.dataset.pictures || 0) + 1 });
-    this.onError(null);
-    this.onShown({ quality, rate: quality === "preview" ? this.rate() : 0 });
+    this.handlers.current.onError(null);
+    this.handlers.current.onShown({ quality, rate: quality === "preview" ? this.rate() : 0 });
   }
 
   // Previews per second.

@@ -6,7 +6,7 @@ import { request, send } from "../parts/api.js";
 import { DropZone } from "../parts/drop_zone.js";
 import { titleOf } from "../parts/titles.js";
 import { Alert, Button, Facts, Form, html, Options, Section, useAct, useEffect, useLater, useNewest, useRef, useState } from "../parts/view.js";
-import { orbit } from "./orbit.js";
+import { useOrbit } from "./orbit.js";
 import { PictureStream, rateOf } from "./picture_stream.js";
 
 export const CAMERA = ["azimuth_deg", "elevation_deg", "zoom"];
@@ -76,26 +76,21 @@ export function useScene({ records: first, id, query, pictureOf }) {
 function Stage({ id, words, hint, describe, onShown = () => {}, onError, camera, stream }) {
   const [canvas, stage] = [useRef(null), useRef(null)];
   const [shown, setShown] = useState(null);
-  const newest = useNewest({ describe, onShown, camera, onError });
+  const handlers = useNewest({
+    onShown({ quality, rate }) {
+      const { label, facts } = describe();
+      setShown({ label, facts: `${facts}${quality === "full" ? "" : rateOf(rate)}` });
+      onShown();
+    },
+    onError,
+  });
   useEffect(() => {
-    stream.current = new PictureStream(canvas.current, {
-      onShown({ quality, rate }) {
-        const { label, facts } = newest.current.describe();
-        setShown({ label, facts: `${facts}${quality === "full" ? "" : rateOf(rate)}` });
-        newest.current.onShown();
-      },
-      onError: (problem) => newest.current.onError(problem),
-    });
-    orbit(stage.current, {
-      turn: (...by) => newest.current.camera.turn(...by),
-      zoom: (factor) => newest.current.camera.zoom(factor),
-      reset: () => newest.current.camera.reset(),
-      grab: (point) => newest.current.camera.grab?.(point, stage.current),
-    });
+    stream.current = new PictureStream(canvas.current, handlers);
     return () => stream.current.close();
   }, []);
+  const orbit = useOrbit({ ...camera, grab: (point) => camera.grab?.(point, stage.current) });
   return html`
-    <div id="stage" class="stage" ref=${stage} tabindex="0" role="group" aria-label=${words[0]}>
+    <div id="stage" class="stage" ref=${stage} tabindex="0" role="group" aria-label=${words[0]} ...${orbit}>
       <canvas id=${id} ref=${canvas} width=${FULL_PX} height=${FULL_PX} role="img" aria-label=${shown?.label ?? words[1]}></canvas>
       <p class="hint" id="stage-hint" hidden=${shown !== null}>${hint}</p>
     </div>

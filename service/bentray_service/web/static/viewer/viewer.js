@@ -73,7 +73,7 @@ function useFields(panes, state) {
 // The plane of a stored quantity beside a region of the speed; null before it is read, and where there is none.
 function useBeside(name, panes, quantity, { region, axis, cursor }) {
   const wanted = region !== null && quantity === "speed" && panes.length === 1 && panes[0].stored.includes(name);
-  const [field] = useRead(() => (wanted ? panes[0].values.field(name) : null), undefined, wanted);
+  const [field] = useRead(() => (wanted ? panes[0].values.field(name) : null), { key: wanted });
   return field?.planeAt(axis, cursor) ?? null;
 }
 
