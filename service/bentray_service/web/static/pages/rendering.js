@@ -30,12 +30,12 @@ function samplingOf({ mode, supersampling }) {
 
 // The view of a volume that the values of the form state; without iso-value and index, those that suit the volume.
 function viewOf(volume, { frames, iso, index, smoothing, filter, ...rest }) {
-  const suited = volume.water_speed_mps === null ? { index: UPLOAD_INDEX } : iso || index ? {} : glassOf(volume);
+  const suited = volume.water_speed_mps === null ? { index: [UPLOAD_INDEX] } : iso || index ? {} : glassOf(volume);
   delete suited.elevation_deg;
   return shownBy({
     ...suited,
-    ...(iso && { iso: Number(iso) }),
-    ...(index && { index: Number(index) }),
+    ...(iso && { iso: [Number(iso)] }),
+    ...(index && { index: [Number(index)] }),
     ...(smoothing && { smoothing: Number(smoothing) }),
     ...(filter !== "bspline3" && { filter }),
     mode: rest.mode,
@@ -54,19 +54,14 @@ function addressesOf({ links }, view) {
   return [preview, full].map((query) => `${links.refraction}?${queryOf(query)}`);
 }
 
-function isoValuesOf({ iso }, histogram) {
-  if (iso !== undefined) return [iso].flat();
-  return histogram?.iso == null ? [] : [histogram.iso];
-}
+const isoValuesOf = ({ iso }, histogram) => iso ?? (histogram?.iso == null ? [] : [histogram.iso]);
 
 // What draws the preview in this browser, or null.
 function drawerOf(local, volume, view, histogram) {
-  const { iso, index = [1.5], ...rest } = view;
+  const { index = [1.5], ...rest } = view;
   // The default iso-value is known for the default filter and smoothing alone.
-  const known = iso !== undefined || (!rest.filter && rest.smoothing === undefined && histogram?.iso != null);
-  if (!known) return null;
-  const [values, indices] = [isoValuesOf(view, histogram), [index].flat()];
-  return local.drawer(volume, { ...rest, iso: values, index: values.map((_, k) => indices[k] ?? indices[0]) }, PREVIEW_PX);
+  const iso = isoValuesOf(view, view.filter || view.smoothing !== undefined ? null : histogram);
+  return local.drawer(volume, { ...rest, iso, index: iso.map((_, k) => index[k] ?? index[0]) }, PREVIEW_PX);
 }
 
 // What differs from the defaults of a form, so that the address restores the view.
@@ -78,12 +73,6 @@ function changedIn(form) {
     if (input.value !== (input.type === "radio" ? "shaded" : usual)) changed.set(input.name, input.value);
   }
   return changed;
-}
-
-// The turntable of a view.
-function turntableOf(volume, { iso, index, ...rest }, frames) {
-  const lists = { ...(iso !== undefined && { iso: [iso].flat() }), ...(index !== undefined && { index: [index].flat() }) };
-  return { kind: "refraction", volume: volume.id, settings: { ...rest, ...lists, frames: Number(frames), format: "apng" } };
 }
 
 // The histogram of a volume and its default iso-value; read() reads it once: after the first picture, whose worker has filtered the volume.
@@ -144,12 +133,14 @@ function Rendering({ volumes, id, query, fields }) {
   const scene = useScene({ records: volumes, id, query, pictureOf });
   const { record: volume, form, values, show, setError } = scene;
   const [histogram, readHistogram] = useHistogram(volume, setError);
-  const turntable = () => turntableOf(volume, viewOf(volume, values()), values().frames);
+  const turntable = (given = values()) => (
+    { kind: "refraction", volume: volume.id, settings: { ...viewOf(volume, given), frames: Number(given.frames), format: "apng" } }
+  );
 
   function pictureOf(record, given) {
     const view = viewOf(record, given);
     setMarks(isoValuesOf(view, histogram));
-    plan(turntable());
+    plan(turntable(given));
     const [preview, full] = addressesOf(record, view);
     return {
       preview,
