@@ -1,9 +1,9 @@
 // The shell of the viewer: opens the page that the address names, and shows the state of the service.
-import { counted } from "./parts/amounts.js";
+import { parse } from "./parts/address.js";
 import { lost, request } from "./parts/api.js";
 import { admitted, at } from "./parts/key.js";
-import { parse } from "./parts/address.js";
 import { Alert, html, render } from "./parts/view.js";
+import { counted } from "./parts/words.js";
 
 // A page is pages/NAME.js with open({ id, query }), which returns its view, or a promise of it.
 const PAGES = [

@@ -1,7 +1,6 @@
-// Jobs kept up to date while a page is open: by the stream of events, or by polling where there is none.
-import { request } from "../parts/api.js";
+// Jobs kept up to date while a page is open: by one stream of server-sent events, opened again when it ends, or by polling where there is none.
+import { authorization, request } from "../parts/api.js";
 import { useAct, useEffect, useNewest, useRead, useReducer, useRef, useShown } from "../parts/view.js";
-import { jobEvents } from "./job_events.js";
 
 // Without a stream of events: intervals while a job is unfinished, and else.
 const BUSY_MS = 3000;
@@ -9,6 +8,12 @@ export const IDLE_MS = 15000;
 // With one: soon after a change of a state; the histories, and the place in the queue, which other tenants change too.
 const SOON_MS = 50;
 const HISTORY_MS = 3000;
+
+const STREAM = "/v1/events";
+// Between two streams: after one that ended, and after those that could not be opened, twice as long each time.
+const AGAIN_MS = 200;
+const LATER_MS = 5000;
+const LATEST_MS = 60000;
 
 export const isUnfinished = ({ state }) => ["queued", "running", "cancelling"].includes(state);
 
@@ -56,4 +61,54 @@ export function useJobs({ read, key = "", historyMs = HISTORY_MS, onJobs = () =>
     await refresh();
   });
   return [jobs, failure ?? error, refresh, change];
+}
+
+// The data of events named "job" in a body, as they arrive.
+async function* changesIn(body) {
+  const reader = body.pipeThrough(new TextDecoderStream()).getReader();
+  let rest = "";
+  for (;;) {
+    const { done, value } = await reader.read();
+    if (done) return;
+    const blocks = (rest + value).split("\n\n");
+    rest = blocks.pop();
+    for (const block of blocks) {
+      const lines = block.split("\n");
+      const data = lines.find((line) => line.startsWith("data: "));
+      if (data && lines.includes("event: job")) yield JSON.parse(data.slice(6));
+    }
+  }
+}
+
+// Calls onChange({ id, state, progress }) for each change of a job, and onOpen(open) when the stream opens and when it cannot
+// be opened. A hidden tab holds no connection. Returns close(). An EventSource could not send the key.
+function jobEvents({ onChange, onOpen }) {
+  let controller = new AbortController();
+  async function connect({ signal }) {
+    for (let wait = LATER_MS, pause = AGAIN_MS; !signal.aborted; pause = AGAIN_MS) {
+      try {
+        const response = await fetch(STREAM, { headers: authorization(), signal, cache: "no-store" });
+        if (!response.ok) throw new Error(`status ${response.status}`);
+        wait = LATER_MS;
+        onOpen(true);
+        for await (const change of changesIn(response.body)) onChange(change);
+      } catch {
+        if (signal.aborted) return;
+        onOpen(false);
+        [pause, wait] = [wait, Math.min(2 * wait, LATEST_MS)];
+      }
+      await new Promise((resolve) => setTimeout(resolve, pause));
+    }
+  }
+  function follow() {
+    controller.abort();
+    controller = new AbortController();
+    if (!document.hidden) connect(controller);
+  }
+  document.addEventListener("visibilitychange", follow);
+  follow();
+  return () => {
+    document.removeEventListener("visibilitychange", follow);
+    controller.abort();
+  };
 }

@@ -1,14 +1,13 @@
 // A list of the newest jobs as cards, kept up to date while the page is open: pictures, state, progress, plan, misfit and files.
 import { linkTo } from "../parts/address.js";
-import { FORMATS } from "../parts/export_menu.js";
-import { inNanoseconds } from "../parts/amounts.js";
 import { inWords, request } from "../parts/api.js";
+import { FORMATS } from "../parts/export_menu.js";
 import { KeyLink, Picture } from "../parts/key.js";
-import { loadTitles, titleOfJob } from "../parts/titles.js";
+import { loadTitles, titleOfJob } from "../parts/lists.js";
 import { Alert, Button, html, useRead, useState } from "../parts/view.js";
 import { glassOf, queryOf, shownBy } from "../parts/views.js";
+import { duration, inNanoseconds, placeInQueue, settingsOf, tasksInWords } from "../parts/words.js";
 import { useJobs } from "./followed_jobs.js";
-import { duration, placeInQueue, settingsOf, tasksInWords } from "./job_words.js";
 import { residuals, Sparkline } from "./misfit_curve.js";
 
 // An image that links to a larger one.
@@ -19,6 +18,13 @@ function Drawn({ address, words, larger = address }) {
       ? "The image could not be drawn."
       : html`<${KeyLink} href=${larger}><${Picture} address=${address} alt=${words} onError=${() => setFailed(true)} /></${KeyLink}>`}
   </div>`;
+}
+
+// A small picture beside the name of a job in a list: it says nothing to a screen reader, which reads the name.
+export function Thumbnail({ job: { links: { field, image } } }) {
+  const [failed, setFailed] = useState(false);
+  const view = field ? { width: 96, height: 96, rays: 2 } : { frame: false, size: 96 };
+  return image && !failed && html`<${Picture} class="thumbnail" address=${`${image}?${queryOf(view)}`} alt="" onError=${() => setFailed(true)} />`;
 }
 
 // The slice without a frame, whose text would be too small, and its range of colours; a 3-D volume is also rendered.

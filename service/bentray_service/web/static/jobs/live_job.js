@@ -1,10 +1,10 @@
 // An unfinished job: what happens now, even progress with the time left, the image and the misfit so far; a failure with its reason.
 import { inWords, request } from "../parts/api.js";
-import { loadTitles, titleOfJob } from "../parts/titles.js";
+import { loadTitles, titleOfJob } from "../parts/lists.js";
 import { Alert, Button, html, useEffect, useNewest, useRead, useReducer, useRef, useState } from "../parts/view.js";
+import { duration, placeInQueue, settingsOf } from "../parts/words.js";
 import { useJobs } from "./followed_jobs.js";
 import { Plan } from "./job_cards.js";
-import { duration, placeInQueue, settingsOf } from "./job_words.js";
 import { comparesModels, MisfitCurve } from "./misfit_curve.js";
 import { PreviewPicture } from "./preview_picture.js";
 import { ProgressEstimate } from "./progress_estimate.js";

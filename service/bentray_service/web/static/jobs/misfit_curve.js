@@ -1,6 +1,6 @@
 // The misfit of a reconstruction after each iteration: as a curve with axes, and as a small one without.
-import { inNanoseconds } from "../parts/amounts.js";
 import { html } from "../parts/view.js";
+import { inNanoseconds } from "../parts/words.js";
 import { Plot } from "../viewer/plot.js";
 
 // Largest over smallest misfit above which a linear axis would show a flat line.

@@ -2,8 +2,8 @@
 import { keepQuery, pick } from "../parts/address.js";
 import { request, send } from "../parts/api.js";
 import { Alert, Button, html, useAct, useEffect, useRead, useRef, useState } from "../parts/view.js";
+import { planOf, waitInWords } from "../parts/words.js";
 import { isUnfinished } from "./followed_jobs.js";
-import { planOf, waitInWords } from "./job_words.js";
 import { LiveJob } from "./live_job.js";
 
 // Best may take half an hour of one processor core for full waveforms.

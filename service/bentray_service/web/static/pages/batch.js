@@ -1,10 +1,10 @@
 // Several scans with one set of settings: choose them, start one reconstruction of each, and follow them as one batch.
 import { go } from "../parts/address.js";
-import { counted, inTime } from "../parts/amounts.js";
 import { send } from "../parts/api.js";
+import { load, titleOf } from "../parts/lists.js";
 import { readSettings, SettingsForm, useSettings } from "../parts/settings_form.js";
-import { load, titleOf } from "../parts/titles.js";
 import { Alert, Button, Facts, Field, Form, html, Section, useShown, useState } from "../parts/view.js";
+import { counted, inTime } from "../parts/words.js";
 
 const wordsOf = (scan) => `${scan.ntx} emitters × ${scan.nrx} receivers · ${inTime(scan.created)}`;
 

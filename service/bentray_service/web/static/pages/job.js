@@ -1,10 +1,9 @@
 // One job: its progress while it runs, then its result; and below it the messages to its webhook.
 import { JobList } from "../jobs/job_cards.js";
 import { LiveJob } from "../jobs/live_job.js";
-import { inTime } from "../parts/amounts.js";
 import { request } from "../parts/api.js";
-import { HeadedTable } from "../parts/tables.js";
-import { Alert, Facts, html, Section, useRead, useShown, useState } from "../parts/view.js";
+import { Alert, Facts, HeadedTable, html, Section, useRead, useShown, useState } from "../parts/view.js";
+import { inTime } from "../parts/words.js";
 
 const FRESH_MS = 5000;
 const COLUMNS = ["Attempt", "Time", "Answer", "Duration"];

@@ -1,21 +1,19 @@
 // Volume rendering: a volume as a lit surface or as glass, turned by mouse, touch or keyboard, and turntables of it.
 import { keepQuery } from "../parts/address.js";
-import { request } from "../parts/api.js";
-import { propertiesOf } from "../parts/description.js";
+import { propertiesOf, request } from "../parts/api.js";
 import { KeyLink } from "../parts/key.js";
-import { planOf, waitInWords } from "../jobs/job_words.js";
+import { load, titleOf } from "../parts/lists.js";
 import { PlainField } from "../parts/settings_fields.js";
-import { load, titleOf } from "../parts/titles.js";
 import { html, useEffect, useRead, useReducer, useRef, useState } from "../parts/view.js";
 import { glassOf, queryOf, shownBy } from "../parts/views.js";
-import { Histogram } from "../scenes/histogram.js";
+import { planOf, waitInWords } from "../parts/words.js";
 import { CAMERA, FULL_PX, PREVIEW_PX, rounded, ScenePage, useScene } from "../scenes/scene.js";
 import { localPreviews } from "../webgl/local_previews.js";
 
 // The side of the picture that a link opens, pixels.
 const LINKED_PX = 1024;
-// Steps of the slider of iso-values.
-const STEPS = 500;
+// Steps of the slider of iso-values, and the height of their histogram in its own unit.
+const [STEPS, HEIGHT] = [500, 60];
 // After the last change until the time of a turntable is asked for.
 const PLAN_MS = 400;
 // Glass of an upload bends light less than a window pane, so that thin walls do not scatter it.
@@ -92,6 +90,19 @@ function usePlan() {
   const key = JSON.stringify([forgotten, job && { ...job, settings: { ...job.settings, ...still } }]);
   const [estimate, error] = useRead(() => job && planOf(job), { key, settle: PLAN_MS });
   return [error?.message ?? (estimate ? `Turntable: ${waitInWords(estimate)}` : ""), plan, forget];
+}
+
+// With a line at each of some values: counts in bins of equal width, on a logarithmic scale: peaks of air hide everything else on a linear one.
+function Histogram({ counts, minimum, maximum, unit, marks, format }) {
+  const nodes = counts.reduce((sum, count) => sum + count, 0);
+  const label = `Histogram of ${nodes.toLocaleString("en")} nodes from ${format(minimum)} to ${format(maximum)} ${unit}`.trim();
+  const most = Math.log1p(Math.max(...counts));
+  const steps = counts.map((count, bin) => `V${(HEIGHT * (1 - Math.log1p(count) / most)).toFixed(2)}H${bin + 1}`);
+  const across = (value) => (counts.length * (value - minimum)) / (maximum - minimum || 1);
+  return html`<svg class="histogram" viewBox=${`0 0 ${counts.length} ${HEIGHT}`} preserveAspectRatio="none" role="img" aria-label=${label}>
+    <path d=${`M0 ${HEIGHT}${steps.join("")}V${HEIGHT}Z`} />
+    ${marks.map((value) => html`<line x1=${across(value)} x2=${across(value)} y1="0" y2=${HEIGHT} />`)}
+  </svg>`;
 }
 
 // The fields of the view; fields: their schemas by name; marks: the iso-values that are shown.

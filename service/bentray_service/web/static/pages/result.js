@@ -1,16 +1,14 @@
 // The result of a reconstruction: image to measure in, how it was made, and what can be done with it.
-import { go, keepQuery, parse } from "../parts/address.js";
+import { Thumbnail } from "../jobs/job_cards.js";
 import { Onward, onwardIn } from "../jobs/onward.js";
-import { Thumbnail } from "../jobs/thumbnail.js";
-import { inTime } from "../parts/amounts.js";
+import { go, keepQuery, parse } from "../parts/address.js";
 import { kept, request, send } from "../parts/api.js";
-import { CopyButton } from "../parts/copying.js";
 import { ExportMenu } from "../parts/export_menu.js";
-import { Menu } from "../parts/menu.js";
 import { Provenance } from "../parts/provenance.js";
 import { ChoiceTable, facts, loadResult, nameOf, PlanTable, TruthTable } from "../parts/result_tables.js";
-import { Alert, Button, Facts, Form, html, useAct, useEffect, useRead, useRef, useState } from "../parts/view.js";
+import { Alert, Button, CopyButton, Facts, Form, html, Menu, useAct, useEffect, useRead, useRef, useState } from "../parts/view.js";
 import { queryOf } from "../parts/views.js";
+import { inTime } from "../parts/words.js";
 import { QUANTITIES } from "../viewer/quantities.js";
 import { stateOf } from "../viewer/state.js";
 import { Viewer } from "../viewer/viewer.js";
@@ -115,7 +113,7 @@ function Result({ result: first, query }) {
     ${renaming && html`<${Rename} job=${job} onRename=${rename} />`}
     <${Alert} id="result-error" error=${error} />
     <${Onward} job=${job} summary=${summary} query=${query}>
-      <${Viewer} panes=${[{ title: name, values, stored: summary.quantities, detail: width && 1e3 * width }]} state=${state} keep=${keepQuery} id="result-viewer" aria-label="Image" />
+      <${Viewer} panes=${[{ title: name, values, stored: summary.quantities, detail: width && 1e3 * width }]} state=${state} keep=${keep} id="result-viewer" aria-label="Image" />
     </${Onward}>
   </div>
   <div class="wide">

@@ -4,13 +4,12 @@ import { PRESETS } from "../jobs/onward.js";
 import { go } from "../parts/address.js";
 import { request, send } from "../parts/api.js";
 import { KeyLink, Picture } from "../parts/key.js";
-import { planInWords, planOf, waitInWords } from "../jobs/job_words.js";
+import { titleOf } from "../parts/lists.js";
 import { readSettings, SettingsForm, useSettings } from "../parts/settings_form.js";
-import { titleOf } from "../parts/titles.js";
 import { Alert, Button, Facts, Form, html, Section, useAct, useEffect, useRead, useReducer, useRef, useState } from "../parts/view.js";
-import { Elements, inWordsOf } from "../scans/scan_drawing.js";
+import { planInWords, planOf, waitInWords } from "../parts/words.js";
 import { ScanEditor } from "../scans/scan_edit.js";
-import { factRows, Quality } from "../scans/scan_facts.js";
+import { Elements, factRows, inWordsOf, Quality } from "../scans/scan_facts.js";
 import { Shot } from "../scans/shot.js";
 
 const PLAN_MS = 400;

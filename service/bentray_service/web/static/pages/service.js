@@ -1,10 +1,8 @@
 // The service: workers, queues, storage against its quota, keys of the tenant, and its projects.
-import { counted, inBytes, inTime } from "../parts/amounts.js";
-import { request } from "../parts/api.js";
-import { description } from "../parts/description.js";
+import { description, request } from "../parts/api.js";
 import { Projects } from "../parts/projects.js";
-import { HeadedTable, Share } from "../parts/tables.js";
-import { Alert, Facts, html, Section, useRead } from "../parts/view.js";
+import { Alert, Facts, HeadedTable, html, Section, useRead } from "../parts/view.js";
+import { counted, inBytes, inTime } from "../parts/words.js";
 
 // Workers send their state every half a second or more rarely.
 const FRESH_MS = 5000;
@@ -20,6 +18,14 @@ const KINDS = {
   jobs: "Unfinished jobs, turntables",
   uploads: "Unfinished uploads",
 };
+
+// A bar for a part of a whole, with its numbers as text beside it.
+function Share({ part, whole, words }) {
+  return html`<div class="share">
+    <meter min="0" max=${whole} low=${0.75 * whole} high=${0.9 * whole} optimum="0" value=${Math.min(part, whole)} aria-label=${words}></meter>
+    <span>${words}</span>
+  </div>`;
+}
 
 function memory({ memory_bytes: used, memory_limit_bytes: limit }) {
   if (used === null) return limit ? `of ${inBytes(limit)}` : "unknown";

@@ -1,12 +1,10 @@
 // Start: upload a scan, and the list of scans.
 import { go, keepQuery, pick } from "../parts/address.js";
-import { inTime } from "../parts/amounts.js";
-import { request, send } from "../parts/api.js";
-import { description } from "../parts/description.js";
+import { description, request, send } from "../parts/api.js";
 import { DropZone } from "../parts/drop_zone.js";
-import { Filters, ListPages, olderOf } from "../parts/lists.js";
-import { titleOf } from "../parts/titles.js";
+import { Filters, ListPages, olderOf, titleOf } from "../parts/lists.js";
 import { Alert, Button, Choice, Facts, Field, Form, html, Section, useAct, useRead, useRef, useShown, useState } from "../parts/view.js";
+import { inTime } from "../parts/words.js";
 
 // Scans on one page of the list.
 const PAGE_LENGTH = 25;

@@ -1,13 +1,11 @@
 // Surface rendering: a mesh with its geometry field as mirror, glass or clay, turned by mouse, touch or keyboard, its objects moved.
 import { keepQuery } from "../parts/address.js";
-import { counted } from "../parts/amounts.js";
-import { request } from "../parts/api.js";
-import { parametersOf, propertiesOf } from "../parts/description.js";
+import { parametersOf, propertiesOf, request } from "../parts/api.js";
+import { load, titleOf } from "../parts/lists.js";
 import { PlainField } from "../parts/settings_fields.js";
-import { Pairs } from "../parts/tables.js";
-import { load, titleOf } from "../parts/titles.js";
-import { Field, html, useEffect, useRead, useState } from "../parts/view.js";
+import { Field, html, Pairs, useEffect, useRead, useState } from "../parts/view.js";
 import { queryOf } from "../parts/views.js";
+import { counted } from "../parts/words.js";
 import { objectAt, objectsOf, placeAt } from "../scenes/camera.js";
 import { CAMERA, clamped, FULL_PX, PREVIEW_PX, ScenePage, useScene } from "../scenes/scene.js";
 

@@ -1,5 +1,4 @@
-// Requests to the service; every failure is an Error whose message can be shown as it is, a refusal has its problem.
-
+// Requests to the service, and its OpenAPI description; every failure is an Error whose message can be shown as it is, a refusal has its problem.
 const STORED = { key: "bentray-key", project: "bentray-project" };
 
 // What this tab keeps until it is closed: the API key ("key") and the project in which it works ("project"); null without.
@@ -65,4 +64,23 @@ export async function request(path, options) {
 // A request with a JSON body.
 export function send(method, path, body, headers = {}) {
   return request(path, { method, headers: { "Content-Type": "application/json", ...headers }, body: JSON.stringify(body) });
+}
+
+let asked = null;
+
+// The OpenAPI description, requested once.
+export function description() {
+  asked ??= request("/openapi.json").catch((error) => {
+    asked = null;
+    throw error;
+  });
+  return asked;
+}
+
+// The JSON schemas of the properties of a record, and of the parameters of a GET request, by name.
+export const propertiesOf = async (schema) => (await description()).components.schemas[schema].properties;
+
+export async function parametersOf(path) {
+  const { parameters } = (await description()).paths[path].get;
+  return Object.fromEntries(parameters.map(({ name, schema }) => [name, schema]));
 }

@@ -1,8 +1,7 @@
 // The menu of downloads of a result: every format, and the picture of the view.
 import { QUANTITIES } from "../viewer/quantities.js";
 import { KeyLink } from "./key.js";
-import { Menu } from "./menu.js";
-import { Facts, html, Options, useState } from "./view.js";
+import { Facts, html, Menu, Options, useState } from "./view.js";
 import { queryOf } from "./views.js";
 
 export const FORMATS = await (await fetch("/static/export_formats.json")).json();

@@ -1,8 +1,7 @@
 // Projects of the tenant: create, rename and delete them; list, add and remove their members, and change roles.
-import { inTime } from "./amounts.js";
 import { request, send } from "./api.js";
-import { HeadedTable } from "./tables.js";
-import { Alert, Button, Choice, Facts, Field, Form, html, Options, useAct, useRead, useRef, useState } from "./view.js";
+import { Alert, Button, Choice, Facts, Field, Form, HeadedTable, html, Options, useAct, useRead, useRef, useState } from "./view.js";
+import { inTime } from "./words.js";
 
 const ROLES = ["reader", "contributor", "owner"];
 const MEMBER = "(key:[0-9a-f]{12}|user:.{1,200})";

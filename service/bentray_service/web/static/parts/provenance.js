@@ -1,10 +1,8 @@
 // Provenance, settings and numerical parameters of a result as tables in words, and all of it as JSON to copy.
-import { inTime } from "./amounts.js";
-import { CopyButton } from "./copying.js";
 import { captionOf } from "./settings_fields.js";
 import { readSettings } from "./settings_form.js";
-import { Pairs } from "./tables.js";
-import { FoldedSection, html, useRead } from "./view.js";
+import { CopyButton, FoldedSection, html, Pairs, useRead } from "./view.js";
+import { inTime } from "./words.js";
 
 const SOFTWARE = { bentray: "Bentray", python: "Python", numpy: "NumPy", numba: "Numba", scipy: "SciPy" };
 const SAID = {

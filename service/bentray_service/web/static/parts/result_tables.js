@@ -1,10 +1,8 @@
 // A result, read from the service: how it was made and how good it is, as tables: errors against the truth, what auto compared, the plan.
-import { duration } from "../jobs/job_words.js";
-import { inNanoseconds } from "./amounts.js";
-import { request } from "./api.js";
-import { HeadedTable, Pairs } from "./tables.js";
-import { FoldedSection, html } from "./view.js";
 import { Values } from "../viewer/quantities.js";
+import { request } from "./api.js";
+import { FoldedSection, HeadedTable, html, Pairs } from "./view.js";
+import { duration, inNanoseconds } from "./words.js";
 
 // { job, volume, summary, values } of a job.
 export async function loadResult(id) {

@@ -1,5 +1,5 @@
 // The form of all settings of a reconstruction, made from their description; only changed settings are sent.
-import { description } from "./description.js";
+import { description } from "./api.js";
 import { changedIn, focusOn, SettingField, settingOf, valueIn, wordsOf } from "./settings_fields.js";
 import { Facts, Field, html, useEffect, useMemo, useReducer, useRef, useState } from "./view.js";
 

@@ -1,4 +1,4 @@
-// The structure of pages: Preact with htm, and the elements and hooks that all pages share.
+// The structure of pages: Preact with htm, and the elements, tables and hooks that all pages share.
 import { useEffect, useLayoutEffect, useRef, useState } from "../vendor/hooks.mjs";
 import htm from "../vendor/htm.mjs";
 import { h } from "../vendor/preact.mjs";
@@ -61,6 +61,78 @@ export function Form({ onSubmit, children, ...more }) {
     onSubmit(event);
   };
   return html`<form onSubmit=${submit} ...${more}>${children}</form>`;
+}
+
+// label: of the frame, another one than that of the section; columns: headings, if there are any; rows: lists of texts or elements, with keys if
+// they move; chosen: the number of the row that is marked.
+export function HeadedTable({ label, columns = [], rows, keys = [], className = "headed", chosen = -1 }) {
+  return html`<div class="scroll" tabindex="0" role="region" aria-label=${label}>
+    <table class=${className}>
+      ${columns.length > 0 && html`<thead><tr>${columns.map((name) => html`<th scope="col">${name}</th>`)}</tr></thead>`}
+      <tbody>${rows.map(([first, ...others], number) => html`<tr key=${keys[number] ?? number} class=${number === chosen ? "chosen" : ""}>
+        <th scope="row">${first}</th>
+        ${others.map((cell) => html`<td>${cell}</td>`)}
+      </tr>`)}</tbody>
+    </table>
+  </div>`;
+}
+
+// Names and values.
+export function Pairs({ rows, className = "pairs", caption }) {
+  return html`<table class=${className}>
+    ${caption && html`<caption class="caption">${caption}</caption>`}
+    <tbody>${rows.map(([name, value]) => html`<tr><th scope="row">${name}</th><td>${value}</td></tr>`)}</tbody>
+  </table>`;
+}
+
+// A menu that opens below its title, and closes by Escape, by a click elsewhere and when its focus goes on. onOpen() is called when it opens.
+export function Menu({ title, className = "", onOpen = () => {}, children }) {
+  const menu = useRef(null);
+  useEffect(() => {
+    const elsewhere = ({ target }) => {
+      if (!menu.current.contains(target)) menu.current.open = false;
+    };
+    document.addEventListener("pointerdown", elsewhere);
+    return () => document.removeEventListener("pointerdown", elsewhere);
+  }, []);
+  const onKeyDown = ({ key, currentTarget }) => {
+    if (key !== "Escape" || !currentTarget.open) return;
+    currentTarget.open = false;
+    currentTarget.querySelector("summary").focus();
+  };
+  const onFocusOut = ({ relatedTarget: next, currentTarget }) => {
+    if (next && !currentTarget.contains(next)) currentTarget.open = false;
+  };
+  return html`<details ref=${menu} class=${`menu ${className}`.trim()} onKeyDown=${onKeyDown} onFocusOut=${onFocusOut} onToggle=${({ target }) => target.open && onOpen()}>
+    <summary>${title}</summary>
+    ${children}
+  </details>`;
+}
+
+const COPIED_MS = 2000;
+
+// A button that copies text() and says so; where the browser gives no clipboard, the text is shown to copy by hand.
+export function CopyButton({ title, text }) {
+  const [copied, setCopied] = useState(false);
+  const [dialog, area] = [useRef(null), useRef(null)];
+  const later = useLater();
+  async function copy() {
+    try {
+      await navigator.clipboard.writeText(text());
+      setCopied(true);
+      later(() => setCopied(false), COPIED_MS);
+    } catch {
+      area.current.value = text();
+      dialog.current.showModal();
+      area.current.select();
+    }
+  }
+  return html`
+    <${Button} onClick=${copy}>${copied ? "Copied" : title}</${Button}>
+    <dialog class="copy" ref=${dialog}>
+      <textarea ref=${area} readonly rows="8" aria-label=${title}></textarea>
+      <button type="button" onClick=${() => dialog.current.close()}>Close</button>
+    </dialog>`;
 }
 
 // Whether the component is still shown, as { current }.

@@ -1,7 +1,7 @@
 // Name, notes and water of a scan: shown, and changed in a form; a corrected copy of a scan in wrong units. Its file stays as it is.
 import { go } from "../parts/address.js";
 import { request, send } from "../parts/api.js";
-import { titleOf } from "../parts/titles.js";
+import { titleOf } from "../parts/lists.js";
 import { Alert, Button, Choice, Facts, Field, Form, html, Labelled, useAct, useEffect, useRef, useShown, useState } from "../parts/view.js";
 
 const TIMES = { s: "s", ms: "ms", us: "µs", ns: "ns" };

@@ -1,12 +1,12 @@
 // What the pages of volume and surface rendering share: the picture of a view, its camera, the form of the view, and what is rendered.
 import { JobList } from "../jobs/job_cards.js";
 import { go } from "../parts/address.js";
-import { inTime } from "../parts/amounts.js";
 import { request, send } from "../parts/api.js";
 import { DropZone } from "../parts/drop_zone.js";
-import { titleOf } from "../parts/titles.js";
+import { titleOf } from "../parts/lists.js";
+import { usePointers } from "../parts/pointers.js";
 import { Alert, Button, Facts, Form, html, Options, Section, useAct, useEffect, useLater, useNewest, useRef, useState } from "../parts/view.js";
-import { useOrbit } from "./orbit.js";
+import { inTime } from "../parts/words.js";
 import { PictureStream, rateOf } from "./picture_stream.js";
 
 export const CAMERA = ["azimuth_deg", "elevation_deg", "zoom"];
@@ -14,6 +14,8 @@ export const CAMERA = ["azimuth_deg", "elevation_deg", "zoom"];
 export const [PREVIEW_PX, FULL_PX] = [256, 512];
 // After the last change until the address has the view: browsers limit how often it changes.
 const KEEP_MS = 200;
+const DEGREES_PER_PIXEL = 0.5;
+const [KEY_DEGREES, KEY_ZOOM] = [5, 1.15];
 
 export const rounded = (value) => Number(value.toPrecision(4));
 export const clamped = (value, least, most) => Math.min(most, Math.max(least, value));
@@ -68,6 +70,46 @@ export function useScene({ records: first, id, query, pictureOf }) {
     for (const [name, value] of query) Object.assign(form.current.elements.namedItem(name) ?? {}, { value });
   }, []);
   return { records, setRecords, record, choose, error, act, setError, form, stream, refresh, values, show, camera: cameraOf(form, show) };
+}
+
+// Turns and zooms a view by mouse, touch and keyboard: handlers for a focusable element. turn(right, up) is called with degrees, zoom(factor) with a factor, and reset() for Home. grab(point) is
+// called for a press first: it returns what follows the moves of the pointer, at points of the element, where it takes the pointer for itself.
+function useOrbit({ turn, zoom, reset, grab }) {
+  const follow = useRef(null);
+  const pointers = usePointers({
+    press(point) {
+      follow.current = point && grab(point);
+    },
+    drag(point, before) {
+      if (follow.current) follow.current(point);
+      else turn(-DEGREES_PER_PIXEL * (point[0] - before[0]), DEGREES_PER_PIXEL * (point[1] - before[1]));
+    },
+    pinch: zoom,
+  });
+  function onKeyDown(event) {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const step = (event.shiftKey ? 3 : 1) * KEY_DEGREES;
+    const actions = {
+      ArrowLeft: () => turn(-step, 0),
+      ArrowRight: () => turn(step, 0),
+      ArrowUp: () => turn(0, step),
+      ArrowDown: () => turn(0, -step),
+      "+": () => zoom(KEY_ZOOM),
+      "=": () => zoom(KEY_ZOOM),
+      "-": () => zoom(1 / KEY_ZOOM),
+      Home: reset,
+    };
+    if (!actions[event.key]) return;
+    event.preventDefault();
+    actions[event.key]();
+  }
+  function onWheel(event) {
+    // Elsewhere the wheel scrolls the page.
+    if (document.activeElement !== event.currentTarget && !event.ctrlKey) return;
+    event.preventDefault();
+    zoom(Math.exp(-0.0015 * event.deltaY));
+  }
+  return { ...pointers, onKeyDown, onWheel };
 }
 
 // The picture of a view, which is turned on it. words: label of the stage and of a canvas without a picture; hint: before the first picture;

@@ -1,6 +1,6 @@
 // The controls of the viewer: quantity, comparison, slices, tool, window and colours.
 import { Button, html, Options, useLayoutEffect, useRef } from "../parts/view.js";
-import { NAMES } from "./colormaps.js";
+import { NAMES } from "./colour_bar.js";
 import { AXES } from "./field.js";
 import { TOOLS, WHOLE_VIEWS } from "./state.js";
 

@@ -1,5 +1,5 @@
 // One plane on a canvas: colours, zoom and pan in mm, scale bar, cursor, and what is measured.
-import { coloursOf } from "./colormaps.js";
+import { coloursOf } from "./colour_bar.js";
 import { extent } from "./field.js";
 
 const MISSING = 0xffe4e4e4;

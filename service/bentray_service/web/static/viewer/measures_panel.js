@@ -1,12 +1,9 @@
 // What is measured in a view: distances, angles and areas, a profile, a region; each can be copied and saved as CSV.
-import { CopyButton } from "../parts/copying.js";
 import { saveBlob } from "../parts/key.js";
-import { HeadedTable } from "../parts/tables.js";
-import { Button, Facts, html, useMemo } from "../parts/view.js";
+import { Button, CopyButton, Facts, HeadedTable, html, useMemo } from "../parts/view.js";
 import { NumberField } from "./controls.js";
 import { AXES } from "./field.js";
-import { outlineOf, profileOf, regionOf } from "./measures.js";
-import { flat, MEASURES, valueOf } from "./measuring.js";
+import { flat, MEASURES, outlineOf, profileOf, regionOf, valueOf } from "./measures.js";
 import { Plot } from "./plot.js";
 import { shown } from "./quantities.js";
 

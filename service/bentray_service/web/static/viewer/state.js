@@ -1,7 +1,7 @@
 // The state of a view, and its form in the address.
-import { NAMES } from "./colormaps.js";
+import { NAMES } from "./colour_bar.js";
 import { AXES } from "./field.js";
-import { MEASURES } from "./measuring.js";
+import { MEASURES } from "./measures.js";
 import { QUANTITIES } from "./quantities.js";
 
 export const TOOLS = {

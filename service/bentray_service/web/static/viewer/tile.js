@@ -3,7 +3,7 @@ import { usePointers } from "../parts/pointers.js";
 import { html, useLayoutEffect, useRef } from "../parts/view.js";
 import { AXES } from "./field.js";
 import { ImageView } from "./image_view.js";
-import { inPlane, MEASURES, withDrag, withPoint } from "./measuring.js";
+import { inPlane, MEASURES, withDrag, withPoint } from "./measures.js";
 import { clampZoom, WHOLE } from "./state.js";
 
 const WHEEL = 1.0015;
