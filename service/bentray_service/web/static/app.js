@@ -23,15 +23,10 @@ let visit = 0;
 // Opens again what could not be opened, once the service answers.
 let again = null;
 
-function markMenu(entry) {
-  for (const anchor of at("pages").querySelectorAll("a")) {
-    if (anchor.getAttribute("href") === entry) anchor.setAttribute("aria-current", "page");
-    else anchor.removeAttribute("aria-current");
-  }
-}
+const show = (view) => render(view, at("page"));
 
-function show(view) {
-  render(view, at("page"));
+function markMenu(entry) {
+  for (const anchor of at("pages").querySelectorAll("a")) anchor.ariaCurrent = anchor.getAttribute("href") === entry ? "page" : null;
 }
 
 async function openPage(first) {
@@ -67,13 +62,12 @@ async function openPage(first) {
 // A line at the top while the service does not answer; what is shown stays, and unfinished jobs are followed again.
 document.addEventListener("connection", ({ detail: answered }) => {
   const line = at("offline");
-  if (line.hidden !== answered) {
-    line.hidden = answered;
-    line.textContent = answered ? "" : "The service does not answer. The page tries again every two seconds.";
-    if (!answered) showSign("not reached", false);
-    if (answered) again?.();
-    checkHealthIn(answered ? 0 : LOST_MS);
-  }
+  if (line.hidden === answered) return;
+  line.hidden = answered;
+  line.textContent = answered ? "" : "The service does not answer. The page tries again every two seconds.";
+  if (answered) again?.();
+  else showSign("not reached", false);
+  checkHealthIn(answered ? 0 : LOST_MS);
 });
 
 let checking = 0;

@@ -1,7 +1,7 @@
 // An unfinished job: what happens now, even progress with the time left, the image and the misfit so far; a failure with its reason.
 import { inWords, request } from "../parts/api.js";
 import { loadTitles, titleOfJob } from "../parts/lists.js";
-import { Alert, Button, html, useEffect, useNewest, useRead, useReducer, useRef, useState } from "../parts/view.js";
+import { Alert, Button, html, useNewest, useRead, useRef, useState } from "../parts/view.js";
 import { duration, placeInQueue, settingsOf } from "../parts/words.js";
 import { useJobs } from "./followed_jobs.js";
 import { Plan } from "./job_cards.js";
@@ -58,15 +58,6 @@ function advice({ kind, error: { type, field } }) {
   // Of a damaged scan the reason says it.
   if (kind !== "reconstruction" || type === "/problems/stored-data-damaged") return "";
   return field ? " Change this and run it again." : " Run it again with fewer nodes, or examine the scan.";
-}
-
-// Draws again every so often.
-function useTicks() {
-  const [, draw] = useReducer((count) => count + 1, 0);
-  useEffect(() => {
-    const ticking = setInterval(draw, TICK_MS);
-    return () => clearInterval(ticking);
-  }, []);
 }
 
 // Progress and time of a job at this moment.
@@ -147,7 +138,8 @@ export function LiveJob({ first, before, onSuccess }) {
   const running = job.state === "running";
   const seen = useRef(false);
   seen.current ||= running && job.kind === "reconstruction";
-  useTicks();
+  // Draws again every so often.
+  useRead(() => null, { waitOf: () => TICK_MS });
   const problem = job.error ? `${inWords(job.error)}${advice(job)}` : error;
   const keeps = before && !(running && job.history.some(({ band_hz: band }) => band));
   return html`

@@ -1,6 +1,7 @@
 // The misfit of a reconstruction after each iteration: as a curve with axes, and as a small one without.
 import { html } from "../parts/view.js";
 import { inNanoseconds } from "../parts/words.js";
+import { meanOf } from "../viewer/measures.js";
 import { Plot } from "../viewer/plot.js";
 
 // Largest over smallest misfit above which a linear axis would show a flat line.
@@ -14,17 +15,12 @@ export function comparesModels(history) {
 
 // Mean residual of each iteration over the slices, stage by stage; and the iterations at which a stage begins.
 export function residuals(history) {
-  const sums = new Map();
-  for (const { stage, sweep, residual_rms_s: value } of history) {
-    if (value === null) continue;
-    const key = `${stage} ${sweep}`;
-    const sum = sums.get(key) ?? { stage, sweep, total: 0, count: 0 };
-    sums.set(key, { ...sum, total: sum.total + value, count: sum.count + 1 });
-  }
-  const sweeps = [...sums.values()].sort((a, b) => a.stage - b.stage || a.sweep - b.sweep);
+  const known = history.filter((row) => row.residual_rms_s !== null);
+  const sweeps = Object.values(Object.groupBy(known, ({ stage, sweep }) => `${stage} ${sweep}`))
+    .sort(([a], [b]) => a.stage - b.stage || a.sweep - b.sweep);
   return {
-    values: sweeps.map(({ total, count }) => total / count),
-    begins: sweeps.flatMap(({ stage }, i) => (i && stage !== sweeps[i - 1].stage ? [i] : [])),
+    values: sweeps.map((rows) => meanOf(rows.map((row) => row.residual_rms_s))),
+    begins: sweeps.flatMap(([{ stage }], i) => (i && stage !== sweeps[i - 1][0].stage ? [i] : [])),
   };
 }
 

@@ -1,7 +1,7 @@
 // From a first image by rays on to full waveforms where these are advised: the offer, the second job in place of the image, and its stop.
 import { keepQuery, pick } from "../parts/address.js";
 import { request, send } from "../parts/api.js";
-import { Alert, Button, html, useAct, useEffect, useRead, useRef, useState } from "../parts/view.js";
+import { Alert, Button, html, useAct, useEffect, useRead, useState } from "../parts/view.js";
 import { planOf, waitInWords } from "../parts/words.js";
 import { isUnfinished } from "./followed_jobs.js";
 import { LiveJob } from "./live_job.js";
@@ -23,7 +23,6 @@ export function Onward({ job, summary, query, children }) {
   const times = summary.misfit_over_noise;
   const [best, setBest] = useState(null);
   const [error, act] = useAct();
-  const begun = useRef(false);
   const next = { kind: "reconstruction", dataset: job.dataset, settings: PRESETS.best };
   const start = () => act(async () => {
     const started = await send("POST", "/v1/jobs", next);
@@ -36,8 +35,6 @@ export function Onward({ job, summary, query, children }) {
     if (isUnfinished(started)) setBest(started);
   });
   useEffect(() => {
-    if (begun.current) return;
-    begun.current = true;
     if (query.get("best")) follow(query.get("best"));
     else if (times !== null && query.get("then") === "best") start();
   }, []);

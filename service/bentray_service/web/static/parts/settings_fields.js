@@ -4,7 +4,6 @@ import { html, Labelled, Options } from "./view.js";
 // What remains of a schema that also accepts null, or several values of one kind.
 const without = (schema) => ({ ...schema, ...(schema.anyOf?.find((branch) => branch.type !== "null") ?? {}), ...schema.items });
 
-const number = (value) => Number(value).toString();
 export const captionOf = (schema) => schema["x-label"] ?? schema.title;
 
 function bounds(schema) {
@@ -13,8 +12,8 @@ function bounds(schema) {
   const most = maximum ?? below;
   if (least === undefined || most === undefined) return "";
   // The largest exact integer says nothing to a reader.
-  if (most >= 2 ** 53 - 1) return `From ${number(least)}.`;
-  return `${above === undefined ? "From" : "Above"} ${number(least)} ${below === undefined ? "to" : "and below"} ${number(most)}.`;
+  if (most >= 2 ** 53 - 1) return `From ${least}.`;
+  return `${above === undefined ? "From" : "Above"} ${least} ${below === undefined ? "to" : "and below"} ${most}.`;
 }
 
 function NumberInput({ schema, value, ...more }) {
@@ -27,29 +26,22 @@ function read(input) {
   return input.value === "" ? undefined : Number(input.value);
 }
 
-const MAYBE = { enum: ["true", "false"], "x-words": { true: "Yes", false: "No" } };
+const choicesOf = (schema) => schema.enum ?? [true, false];
+const YES = { true: "Yes", false: "No" };
 
-// Kinds of fields: their inputs, and what the inputs say; undefined stands for the default.
+// Kinds of fields: their inputs, and what the inputs say by a schema; undefined stands for the default.
 const KINDS = {
   choice: {
     inputs: ({ schema, nullable, value, ...more }) => html`<select ...${more}>
       ${nullable && html`<option value="">Automatic</option>`}
-      <${Options} entries=${schema.enum.map((word) => [word, schema["x-words"]?.[word] ?? word])} chosen=${value} />
+      <${Options} entries=${choicesOf(schema).map((word) => [word, (schema["x-words"] ?? YES)[word] ?? word])} chosen=${value} />
     </select>`,
-    read: ([select]) => select.value || undefined,
-    about: () => "",
+    read: ([select], schema) => choicesOf(schema).find((word) => String(word) === select.value),
     unset: "Automatic",
   },
   yes: {
     inputs: ({ schema, nullable, value, ...more }) => html`<input type="checkbox" defaultChecked=${Boolean(value)} ...${more} />`,
     read: ([box]) => box.checked,
-    about: () => "",
-  },
-  maybe: {
-    inputs: ({ schema, value, ...more }) => KINDS.choice.inputs({ schema: MAYBE, value: String(value), ...more }),
-    read: ([select]) => (select.value ? select.value === "true" : undefined),
-    about: () => "",
-    unset: "Automatic",
   },
   pair: {
     inputs: ({ schema, nullable, value, name, id, ...more }) => ["lowest", "highest"].map((end, i) => html`<${NumberInput} schema=${schema.prefixItems[i]}
@@ -69,8 +61,8 @@ const KINDS = {
 };
 
 function kindOf(schema, nullable) {
-  if (schema.enum) return "choice";
-  if (schema.type === "boolean") return nullable ? "maybe" : "yes";
+  if (schema.type === "boolean" && !nullable) return "yes";
+  if (schema.enum || schema.type === "boolean") return "choice";
   return schema.prefixItems ? "pair" : "number";
 }
 
@@ -94,14 +86,14 @@ export const focusOn = (form, setting) => inputsOf(form, setting)[0].focus();
 
 // The value of a setting in the form, undefined for its default; throws an error that says what is wrong.
 export function changedIn(form, setting) {
-  const value = KINDS[setting.kind].read(inputsOf(form, setting));
+  const value = KINDS[setting.kind].read(inputsOf(form, setting), setting.schema);
   return value === undefined || JSON.stringify(value) === JSON.stringify(setting.schema.default) ? undefined : value;
 }
 
 // The value of a setting in the form, its default without one; undefined for a wrong number.
 export function valueIn(form, setting) {
   try {
-    return KINDS[setting.kind].read(inputsOf(form, setting)) ?? setting.schema.default;
+    return KINDS[setting.kind].read(inputsOf(form, setting), setting.schema) ?? setting.schema.default;
   } catch {
     return undefined;
   }
@@ -113,7 +105,7 @@ export const wordsOf = ({ path, schema }) => [path, captionOf(schema), schema.de
 // value: the one to begin with; fault: what is wrong, "" for nothing.
 export function SettingField({ setting: { path, schema, kind, nullable }, value, fault, hidden }) {
   const id = `set-${path.replaceAll(".", "-")}`;
-  const { inputs, about, unset = "Empty" } = KINDS[kind];
+  const { inputs, about = () => "", unset = "Empty" } = KINDS[kind];
   const label = html`<label class="caption" for=${id}>${captionOf(schema)}${schema["x-unit"] && ` (${schema["x-unit"]})`}</label>`;
   const hint = [schema.description, about(schema), schema["x-unset"] && `${unset}: ${schema["x-unset"]}.`].filter(Boolean).join(" ");
   const described = { "aria-describedby": `${id}-hint ${id}-error`, ...(fault && { "aria-invalid": "true" }) };

@@ -83,7 +83,7 @@ export function profileOf(plane, [x0, y0, x1, y1]) {
 const INNER = 1.25;
 const OUTER = 2;
 
-const meanOf = (values) => values.reduce((sum, one) => sum + one, 0) / values.length;
+export const meanOf = (values) => values.reduce((sum, one) => sum + one, 0) / values.length;
 
 // Whether a point is inside an outline of points.
 function isInside(outline, x, y) {
