@@ -1,21 +1,16 @@
 // The image of a running reconstruction to scale, drawn again after each iteration in colours that change slowly.
-import { html, useEffect, useLayoutEffect, useRef } from "../parts/view.js";
+import { html, useRef } from "../parts/view.js";
 import { ColourBar } from "../viewer/colour_bar.js";
-import { ImageView } from "../viewer/image_view.js";
+import { Field } from "../viewer/field.js";
+import { useImageView } from "../viewer/image_view.js";
 import { robustLimits } from "../viewer/measures.js";
 import { float32Of } from "../viewer/npy.js";
 import { QUANTITIES } from "../viewer/quantities.js";
+import { WHOLE } from "../viewer/state.js";
 
 const { map: MAP, words: WORDS, unit: UNIT } = QUANTITIES.speed;
 // The range widens at once to that of a result, and narrows by this share of the way with each image.
 const EASE = 0.5;
-
-// As a plane of the viewer; lengths in mm.
-function planeOf(record) {
-  const [na, nb] = record.shape;
-  const [spacing, origin] = [record.spacing_m, record.origin_m].map((lengths) => lengths.map((metres) => 1e3 * metres));
-  return { na, nb, names: ["x", "y"], spacing, origin, values: float32Of(record.speed) };
-}
 
 // What the image is of: stage and iteration, and which slice or candidate method.
 function captionOf({ stage, iteration, part, parts, shape, every }, what) {
@@ -23,37 +18,32 @@ function captionOf({ stage, iteration, part, parts, shape, every }, what) {
   return [`Stage ${stage}, iteration ${iteration}`, parts > 1 ? `${what} ${part} of ${parts}` : "", grid].filter(Boolean).join(" · ");
 }
 
-// What is shown after another record: its plane and the range of its colours.
+// What is shown after another record, {} before the first one: its plane and the range of its colours.
 function follow(before, record) {
-  const plane = planeOf(record);
+  const [spacing, origin] = [record.spacing_m, record.origin_m].map((lengths) => lengths.map((metres) => 1e3 * metres));
+  const plane = new Field(float32Of(record.speed), record.shape, spacing, origin).plane("z", 0);
   const [low, high] = robustLimits([plane.values]);
   const key = [record.stage, record.iteration, record.part].join();
-  const pictures = (before?.pictures ?? 0) + 1;
-  if (!before) return { record, plane, key, pictures, low, high };
   // The same image again changes nothing.
   const ease = key === before.key ? 0 : EASE;
   const eased = (from, to) => from + ease * (to - from);
-  return { record, plane, key, pictures, low: Math.min(low, eased(before.low, low)), high: Math.max(high, eased(before.high, high)) };
+  const range = { low: Math.min(low, eased(before.low ?? low, low)), high: Math.max(high, eased(before.high ?? high, high)) };
+  return { record, plane, key, pictures: (before.pictures ?? 0) + 1, ...range };
 }
 
 // record: an answer of GET /v1/jobs/{id}/preview, or null before the first one; what: the name of its parts.
 export function PreviewPicture({ record, what }) {
-  const [canvas, image, state] = [useRef(null), useRef(null), useRef(null)];
-  if (record && record !== state.current?.record) state.current = follow(state.current, record);
-  const shown = state.current;
-  useEffect(() => () => image.current?.close(), []);
-  useLayoutEffect(() => {
-    if (!shown) return;
-    image.current ??= new ImageView(canvas.current);
-    image.current.show(shown.plane, { low: shown.low, high: shown.high, map: MAP, centre: null, zoom: 1, marks: {} });
-  }, [shown]);
+  const state = useRef({});
+  if (record && record !== state.current.record) state.current = follow(state.current, record);
+  const { plane, pictures, low = 0, high = 1 } = state.current;
+  const [canvas] = useImageView(plane, { low, high, map: MAP, ...WHOLE, marks: {} });
   const label = record ? `Sound speed so far, ${record.range_mps.map(Math.round).join(" to ")} m/s` : "No image yet";
   return html`<figure class="tile">
     <div class=${`preview-stage ${record ? "drawn" : ""}`}>
-      <canvas class="preview" ref=${canvas} role="img" aria-label=${label} data-pictures=${shown?.pictures}></canvas>
+      <canvas class="preview" ref=${canvas} role="img" aria-label=${label} data-pictures=${pictures}></canvas>
       <p class="hint" hidden=${record !== null}>The image appears after the first iteration</p>
     </div>
-    <${ColourBar} low=${shown?.low ?? 0} high=${shown?.high ?? 1} map=${MAP} words=${`${WORDS} (${UNIT})`} hidden=${!record} />
+    <${ColourBar} low=${low} high=${high} map=${MAP} words=${`${WORDS} (${UNIT})`} hidden=${!record} />
     <figcaption class="facts">${record && captionOf(record, what)}</figcaption>
   </figure>`;
 }

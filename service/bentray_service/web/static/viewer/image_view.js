@@ -1,4 +1,5 @@
 // One plane on a canvas: colours, zoom and pan in mm, scale bar, cursor, and what is measured.
+import { useLayoutEffect, useRef } from "../parts/view.js";
 import { coloursOf } from "./colour_bar.js";
 import { extent } from "./field.js";
 
@@ -37,18 +38,24 @@ function roundLength(most) {
   return Math.max(...[0.5, 1, 2, 5].map((step) => step * power).filter((one) => one <= most));
 }
 
-export class ImageView {
-  constructor(canvas) {
-    this.canvas = canvas;
-    this.plane = null;
-    this.bitmaps = [];
-    this.look = { centre: null, zoom: 1, marks: {} };
-    this.watcher = new ResizeObserver(() => this.draw());
-    this.watcher.observe(canvas);
-  }
+// [canvas, view]: for the element of a plane, and its ImageView, which shows it after each drawing of the component. plane: null for none yet.
+export function useImageView(plane, look) {
+  const [canvas, view] = [useRef(null), useRef(null)];
+  useLayoutEffect(() => {
+    view.current = new ImageView(canvas.current);
+    const watcher = new ResizeObserver(() => view.current.draw());
+    watcher.observe(canvas.current);
+    return () => watcher.disconnect();
+  }, []);
+  useLayoutEffect(() => {
+    if (plane) view.current.show(plane, look);
+  });
+  return [canvas, view];
+}
 
-  close() {
-    this.watcher.disconnect();
+class ImageView {
+  constructor(canvas) {
+    Object.assign(this, { canvas, plane: null });
   }
 
   // Show a plane; other: one shown right of the share `swipe` of the width; deviations: those that fade the plane.

@@ -1,8 +1,8 @@
 // One image of the viewer: a canvas with its title; mouse, pen, touch and keys on it change the state of the view.
 import { usePointers } from "../parts/pointers.js";
-import { html, useLayoutEffect, useRef } from "../parts/view.js";
+import { html, useRef } from "../parts/view.js";
 import { AXES } from "./field.js";
-import { ImageView } from "./image_view.js";
+import { useImageView } from "./image_view.js";
 import { inPlane, MEASURES, withDrag, withPoint } from "./measures.js";
 import { clampZoom, WHOLE } from "./state.js";
 
@@ -94,14 +94,10 @@ function actionsOf({ key, axis }, image, { main, state, window, change, setWindo
   };
 }
 
-// image: as for ImageView.show; actions: see actionsOf.
+// image: its plane and look, as for ImageView.show; actions: see actionsOf.
 export function Tile({ tile, words, image: { plane, ...look }, actions }) {
-  const [canvas, view, pressed] = [useRef(null), useRef(null), useRef(null)];
-  useLayoutEffect(() => {
-    view.current = new ImageView(canvas.current);
-    return () => view.current.close();
-  }, []);
-  useLayoutEffect(() => view.current.show(plane, look));
+  const [canvas, view] = useImageView(plane, look);
+  const pressed = useRef(null);
   const { state } = actions;
   const act = () => actionsOf(tile, view.current, actions);
   const pointers = usePointers({
