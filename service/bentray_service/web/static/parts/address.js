@@ -13,9 +13,7 @@ export function go(path) {
 
 // State the view in the address, without a step in the history and without opening the page again.
 export function keepQuery(query) {
-  const { path } = parse(location.hash);
-  const text = query.toString();
-  history.replaceState(history.state, "", `#${path}${text ? `?${text}` : ""}`);
+  history.replaceState(history.state, "", linkTo(parse(location.hash).path, query));
 }
 
 // Some parameters of an address.

@@ -1,13 +1,11 @@
 // Requests to the service, and its OpenAPI description; every failure is an Error whose message can be shown as it is, a refusal has its problem.
-const STORED = { key: "bentray-key", project: "bentray-project" };
-
 // What this tab keeps until it is closed: the API key ("key") and the project in which it works ("project"); null without.
-export const kept = (name) => sessionStorage.getItem(STORED[name]);
+export const kept = (name) => sessionStorage.getItem(`bentray-${name}`);
 
 // Without a value it is forgotten.
 export function keep(name, value) {
-  if (value) sessionStorage.setItem(STORED[name], value);
-  else sessionStorage.removeItem(STORED[name]);
+  if (value) sessionStorage.setItem(`bentray-${name}`, value);
+  else sessionStorage.removeItem(`bentray-${name}`);
 }
 
 // The headers of every request.
@@ -27,8 +25,6 @@ export function inWords(problem) {
   return `${problem.title}: ${problem.detail}`;
 }
 
-const LOST = "The service does not answer.";
-
 // What waits for the service hears of it: whether the newest request was answered, however.
 function report(answered) {
   document.dispatchEvent(new CustomEvent("connection", { detail: answered }));
@@ -37,7 +33,7 @@ function report(answered) {
 // For a request that was not answered: an error to throw.
 export function lost() {
   report(false);
-  return new Error(LOST);
+  return new Error("The service does not answer.");
 }
 
 // The response to a request that was not refused.

@@ -1,7 +1,7 @@
 // Lists of records: titles, pages of a list that is newest first, and fields that search while one types.
 import { linkTo } from "./address.js";
 import { request } from "./api.js";
-import { html, useLater } from "./view.js";
+import { Form, html, useLater } from "./view.js";
 
 const TYPING_MS = 300;
 
@@ -56,10 +56,8 @@ export function Filters({ label, onChange, children, ...more }) {
     const filled = [...new FormData(form)].map(([name, value]) => [name, value.trim()]).filter(([, value]) => value);
     onChange(new URLSearchParams(filled));
   };
-  const submit = (event) => {
-    event.preventDefault();
-    read(event.currentTarget);
-  };
   const onInput = ({ currentTarget, target }) => later(() => read(currentTarget), target.type === "search" ? TYPING_MS : 0);
-  return html`<form class="filters" role="search" aria-label=${label} onInput=${onInput} onSubmit=${submit} ...${more}>${children}</form>`;
+  return html`<${Form} class="filters" role="search" aria-label=${label} onInput=${onInput} onSubmit=${({ currentTarget }) => read(currentTarget)} ...${more}>
+    ${children}
+  </${Form}>`;
 }

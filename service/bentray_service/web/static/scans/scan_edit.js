@@ -39,17 +39,15 @@ function UnitFields({ name, words, units, proposed = {} }) {
   </div>`;
 }
 
+// Hertz of the units of these fields.
+const HERTZ = { sampling_rate_hz: 1e6, frequency_hz: 1e3 };
+
 // What the fields of the form state.
-function correctionIn(fields) {
-  const correction = {};
-  for (const what of ["times", "positions"]) {
-    if (!fields[`${what}_in`].value) continue;
-    for (const name of [`${what}_in`, `${what}_read_as`]) correction[name] = fields[name].value;
-  }
-  if (fields.sampling.value) correction.sampling_rate_hz = 1e6 * fields.sampling.value;
-  if (fields.frequency.value) correction.frequency_hz = 1e3 * fields.frequency.value;
-  if (fields.arrangement.value) correction.arrangement = fields.arrangement.value;
-  return correction;
+function correctionIn(form) {
+  const stated = Object.fromEntries([...new FormData(form)].filter(([, value]) => value));
+  for (const what of ["times", "positions"]) if (!stated[`${what}_in`]) delete stated[`${what}_read_as`];
+  for (const name of Object.keys(HERTZ)) if (stated[name]) stated[name] *= HERTZ[name];
+  return stated;
 }
 
 // A copy with a correction, onMake(correction, key). proposed: corrections that the numbers of the scan suggest.
@@ -58,7 +56,7 @@ function CorrectForm({ proposed, form, error, onMake, onCancel }) {
   const last = useRef({ body: "", key: "" });
   const proposal = (name) => proposed.find(({ what }) => what === name);
   async function make() {
-    const correction = correctionIn(form.current.elements);
+    const correction = correctionIn(form.current);
     const body = JSON.stringify(correction);
     // The same again, as after an answer that was lost, makes no second copy.
     if (body !== last.current.body) last.current = { body, key: crypto.getRandomValues(new Uint32Array(4)).join("-") };
@@ -74,9 +72,9 @@ function CorrectForm({ proposed, form, error, onMake, onCancel }) {
     <${Facts}>Travel times, time of the first sample, and sample interval.</${Facts}>
     <${UnitFields} name="positions" words="Lengths" units=${LENGTHS} proposed=${proposal("positions")} />
     <${Facts}>Positions of the elements, and all other lengths.</${Facts}>
-    <${Field} caption="Sampling rate (MHz)" label=${{ class: "short" }} name="sampling" type="number" min="0.001" max="100000" step="any"
+    <${Field} caption="Sampling rate (MHz)" label=${{ class: "short" }} name="sampling_rate_hz" type="number" min="0.001" max="100000" step="any"
       placeholder="by the times" />
-    <${Field} caption="Centre frequency (kHz)" label=${{ class: "short" }} name="frequency" type="number" min="1" max="10000000" step="any"
+    <${Field} caption="Centre frequency (kHz)" label=${{ class: "short" }} name="frequency_hz" type="number" min="1" max="10000000" step="any"
       placeholder="as stored" defaultValue=${hertz ? 1e-3 * hertz : ""} />
     <${Field} caption="Fault in the order of the elements" label=${{ class: "short" }} name="arrangement" type="text" maxlength="80"
       placeholder="none" defaultValue=${proposal("arrangement")?.arrangement ?? ""} />

@@ -26,26 +26,24 @@ export function frameOf(azimuthDeg, elevationDeg) {
 
 const plus = (a, b, by) => a.map((one, axis) => one + by * b[axis]);
 
-function camera({ scene, azimuth_deg: azimuth, elevation_deg: elevation, zoom }) {
+// The eye of a camera, and the direction in which it sees a point of a square picture, u and v from -1/2 to 1/2 right and down.
+function rayAt({ scene, azimuth_deg: azimuth, elevation_deg: elevation, zoom }, u, v) {
   const { centre, radius } = FRAMINGS[scene];
-  const frame = frameOf(azimuth, elevation);
-  const away = radius / Math.sin(radians(VIEW_DEG / 2));
-  return { ...frame, eye: plus(centre, frame.ahead, -away), wide: (2 * Math.tan(radians(VIEW_DEG / 2))) / zoom };
+  const { right, down, ahead } = frameOf(azimuth, elevation);
+  const wide = (2 * Math.tan(radians(VIEW_DEG / 2))) / zoom;
+  return { eye: plus(centre, ahead, -radius / Math.sin(radians(VIEW_DEG / 2))), along: plus(plus(ahead, right, u * wide), down, v * wide) };
 }
 
-// The place at a height, m, that a point of a square picture shows, u and v from -1/2 to 1/2 right and down; null beyond the
-// horizon.
+// The place at a height, m, that a point of the picture shows; null beyond the horizon.
 export function placeAt(view, u, v, height) {
-  const { eye, ahead, right, down, wide } = camera(view);
-  const along = plus(plus(ahead, right, u * wide), down, v * wide);
+  const { eye, along } = rayAt(view, u, v);
   const far = (height - eye[2]) / along[2];
   return far > 0 && Number.isFinite(far) ? plus(eye, along, far).slice(0, 2) : null;
 }
 
 // The object nearest to the eye that a point of the picture shows, taken as balls; -1 for none.
 export function objectAt(view, objects, u, v) {
-  const { eye, ahead, right, down, wide } = camera(view);
-  const along = plus(plus(ahead, right, u * wide), down, v * wide);
+  const { eye, along } = rayAt(view, u, v);
   const length = Math.hypot(...along);
   let found = -1;
   let nearest = Infinity;
