@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
+from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import expect, sync_playwright
 
 from bentray_service.ingest import canonical
@@ -24,12 +25,14 @@ expect.set_options(timeout=PATIENCE_MS)
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
+def browser(request: pytest.FixtureRequest) -> Iterator[Any]:
+    """Chromium without a graphics card; a file may name another one by ``FLAGS``."""
     if not CHROMIUM.exists():
         pytest.skip(f"no browser at {CHROMIUM}")
+    flags = getattr(request.module, "FLAGS", ("--disable-gpu",))
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(
-            executable_path=str(CHROMIUM), args=["--no-sandbox", "--disable-gpu"]
+            executable_path=str(CHROMIUM), args=["--no-sandbox", *flags], timeout=4 * PATIENCE_MS
         )
         yield browser
         browser.close()
@@ -49,6 +52,17 @@ def page(browser: Any) -> Iterator[Any]:
         )
         yield page
         assert wrong == []
+
+
+def serious(page: Any, options: dict[str, Any] | None = None) -> dict[str, list[str]]:
+    """Serious findings of axe on the page as it is, menus and details open: parts by the names of rules."""
+    report = Axe().run(page, options=options).response
+    assert report["passes"]
+    return {
+        rule["id"]: [node["html"][:120] for node in rule["nodes"][:3]]
+        for rule in report["violations"]
+        if rule["impact"] in ("serious", "critical")
+    }
 
 
 class SharedService(NamedTuple):

@@ -3,15 +3,16 @@
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
+import h5py
 import httpx
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from ..conftest import ENDED, PATIENCE_S, FakeWork
+from .conftest import SharedService
 from .live_results import started
 
 SPACING_M, ORIGIN_M = (1e-3, 2e-3, 3e-3), (-0.01, -0.02, 0.005)
@@ -23,15 +24,13 @@ def known(shape: tuple[int, ...], seed: int = 0) -> NDArray[np.float64]:
 
 
 def finished(
-    address: str,
-    scan: Callable[..., Path],
-    work: FakeWork,
-    monkeypatch: pytest.MonkeyPatch,
+    service: SharedService,
     speed: NDArray[np.float64],
+    change: Callable[[h5py.File], None] | None = None,
     **images: Any,
 ) -> str:
-    """The id of a job that made these images, or other fields of a result, of the scan."""
-    plain = type(work).__call__
+    """The id of a job that made these images, or other fields of a result, of the scan after a change."""
+    plain = FakeWork.__call__
 
     def made(self: FakeWork, *given: Any, **named: Any) -> Any:
         grid = {"spacing_m": SPACING_M[: speed.ndim], "origin_m": ORIGIN_M[: speed.ndim]}
@@ -40,12 +39,12 @@ def finished(
             own["resolution_width_m"] = (0.0025,)
         return replace(plain(self, *given, **named), speed=speed, **own, **grid)
 
-    monkeypatch.setattr(type(work), "__call__", made)
-    job = started(address, scan)
-    deadline = time.monotonic() + PATIENCE_S
-    while job["state"] not in ENDED and time.monotonic() < deadline:
-        time.sleep(0.02)
-        job = httpx.get(f"{address}{job['links']['self']}", timeout=60).json()
-    monkeypatch.setattr(type(work), "__call__", plain)
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        monkeypatch.setattr(FakeWork, "__call__", made)
+        job = started(service.address, lambda: service.scan(change))
+        deadline = time.monotonic() + PATIENCE_S
+        while job["state"] not in ENDED and time.monotonic() < deadline:
+            time.sleep(0.02)
+            job = httpx.get(f"{service.address}{job['links']['self']}", timeout=60).json()
     assert job["state"] == "succeeded", job
     return str(job["id"])

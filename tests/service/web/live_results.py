@@ -1,5 +1,6 @@
 """A reconstruction of known images, each made when a test says so, as a job that a browser watches."""
 
+import io
 import queue
 from collections.abc import Callable
 from dataclasses import replace
@@ -9,6 +10,7 @@ from typing import Any
 import httpx
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 from bentray_kernels.task_graph import Cancelled
 from bentray_kernels.tomography.reconstruction_graph import ReconstructionCheckpoint
@@ -72,6 +74,15 @@ def uploaded(address: str, file: Path) -> dict[str, Any]:
     """The record of a scan that has just been uploaded."""
     headers = {"Content-Type": "application/x-hdf5"}
     sent = httpx.post(f"{address}/v1/datasets", content=file.read_bytes(), headers=headers, timeout=60)
+    return dict(sent.raise_for_status().json())
+
+
+def stored_volume(address: str, values: ArrayLike, query: str = "") -> dict[str, Any]:
+    """The record of a volume that has just been uploaded."""
+    content = io.BytesIO()
+    np.save(content, values)
+    headers = {"Content-Type": "application/x-npy"}
+    sent = httpx.post(f"{address}/v1/volumes{query}", content=content.getvalue(), headers=headers, timeout=60)
     return dict(sent.raise_for_status().json())
 
 

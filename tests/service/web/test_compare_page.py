@@ -16,9 +16,8 @@ FIRST, SECOND = known((24, 16)), 20.0 + known((24, 16), seed=1)
 
 @pytest.fixture(scope="module")
 def both(shared_service):
-    address, scan, work, monkeypatch, _ = shared_service
-    ids = [finished(address, scan, work, monkeypatch, mps) for mps in (FIRST, SECOND)]
-    return f"{address}/#/compare/{','.join(ids)}"
+    ids = [finished(shared_service, mps) for mps in (FIRST, SECOND)]
+    return f"{shared_service.address}/#/compare/{','.join(ids)}"
 
 
 def test_both_images_have_one_range_and_one_cursor(page, both):
@@ -40,8 +39,7 @@ def test_both_images_have_one_range_and_one_cursor(page, both):
 
 @pytest.mark.nightly
 def test_four_images_have_one_range(page, both, shared_service):
-    address, scan, work, monkeypatch, _ = shared_service
-    more = [finished(address, scan, work, monkeypatch, 3.0 * FIRST - mps) for mps in (3000.0, 2990.0)]
+    more = [finished(shared_service, 3.0 * FIRST - mps) for mps in (3000.0, 2990.0)]
     ready(page, ",".join([both, *more]) + "?ellipse=-8,-15,0,-5")
     expect(page.locator("canvas.plane")).to_have_count(4)
     expect(page.locator(".statistics tr").first.locator("th")).to_have_count(5)

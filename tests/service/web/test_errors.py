@@ -50,24 +50,39 @@ def http():
     return TestClient(app, raise_server_exceptions=False)
 
 
-def test_invalid_input_names_field_found_accepted(http):
-    answer = http.get("/refused")
-    assert answer.headers["content-type"] == "application/problem+json"
-    assert answer.json() == {
-        "type": "/problems/invalid-input",
-        "title": "Invalid value",
-        "status": 422,
-        "detail": "speed: found -1; accepted: a speed > 0",
-        "instance": "/refused",
-        "field": "speed",
-        "found": "-1",
-        "accepted": "a speed > 0",
-    }
+SPEED = {
+    "type": "/problems/invalid-input",
+    "title": "Invalid value",
+    "status": 422,
+    "detail": "speed: found -1; accepted: a speed > 0",
+    "instance": "/refused",
+    "field": "speed",
+    "found": "-1",
+    "accepted": "a speed > 0",
+}
+UNREADABLE = {"type": "/problems/unreadable-body", "field": "body", "found": "unreadable JSON"}
+# Method and address, body, status, and what the problem says.
+CASES = {
+    "refused": ("GET /refused", None, 422, SPEED),
+    "table": ("GET /full", None, 507, {"type": "/problems/storage-full"}),
+    "half a character": ("GET /half", None, 422, {"field": "?"}),
+    "unknown": ("GET /nowhere", None, 404, {"type": "/problems/not-found"}),
+    "method": ("PUT /refused", None, 405, {"type": "/problems/method-not-allowed"}),
+    "bytes": ("POST /refused", b"\xff", 400, UNREADABLE),
+    "nesting": ("POST /refused", b"[" * 50_000, 400, UNREADABLE),
+    "digits": ("POST /refused", b"9" * 5000, 400, UNREADABLE),
+    "list": ("POST /refused", b"[]", 422, {"field": "body"}),
+    "null": ("POST /refused", b"null", 422, {"field": "body"}),
+    "text": ("POST /refused", b'"x"', 422, {"field": "body"}),
+}
 
 
-def test_a_refusal_has_the_status_of_the_table(http):
-    answer = http.get("/full")
-    assert (answer.status_code, answer.json()["type"]) == (507, "/problems/storage-full")
+@pytest.mark.parametrize(("request_line", "body", "status", "problem"), CASES.values(), ids=CASES)
+def test_errors_are_problems(http, request_line, body, status, problem):
+    headers = {"Content-Type": "application/json"}
+    answer = http.request(*request_line.split(), content=body, headers=headers)
+    assert (answer.status_code, answer.headers["content-type"]) == (status, "application/problem+json")
+    assert answer.json() | problem == answer.json()
 
 
 def test_every_wrong_parameter_is_listed(http):
@@ -79,13 +94,9 @@ def test_every_wrong_parameter_is_listed(http):
     assert body["errors"][1] == {"field": "m", "found": "nothing", "accepted": "a value; it is required"}
 
 
-def test_router_errors_are_problems_too(http):
-    missing, wrong = http.get("/nowhere"), http.put("/refused")
-    assert (missing.status_code, missing.json()["type"]) == (404, "/problems/not-found")
-    assert (wrong.status_code, wrong.json()["type"]) == (405, "/problems/method-not-allowed")
-    assert wrong.headers["allow"] == "GET, POST"
-    assert "accepted: GET, POST" in wrong.json()["detail"]
-    for method in ("OPTIONS", "TRACE", "PROPFIND"):
+def test_a_wrong_method_names_the_others(http):
+    assert "accepted: GET, POST" in http.put("/refused").json()["detail"]
+    for method in ("PUT", "OPTIONS", "TRACE", "PROPFIND"):
         answer = http.request(method, "/refused")
         assert (answer.status_code, answer.headers["allow"]) == (405, "GET, POST"), method
 
@@ -111,26 +122,6 @@ def test_allow_header_lists_methods_of_all_routes(tmp_path):
         answer = http.delete(address)
         assert (answer.status_code, answer.headers["allow"]) == (405, allowed)
         assert answer.json()["detail"].endswith(f"accepted: {allowed}")
-
-
-@pytest.mark.parametrize("body", [b"\xff", b"[" * 50_000, b"9" * 5000], ids=["bytes", "nesting", "digits"])
-def test_a_body_that_is_no_readable_json_is_named(http, body):
-    answer = http.post("/refused", content=body, headers={"Content-Type": "application/json"})
-    assert (answer.status_code, answer.json()["type"]) == (400, "/problems/unreadable-body")
-    assert (answer.json()["field"], answer.json()["found"]) == ("body", "unreadable JSON")
-
-
-@pytest.mark.parametrize("body", [b"[]", b"null", b'"x"'])
-def test_wrong_body_type_names_json_types(http, body):
-    answer = http.post("/refused", content=body, headers={"Content-Type": "application/json"})
-    assert answer.status_code == 422
-    assert answer.json()["field"] == "body"
-
-
-def test_half_characters_do_not_break_the_answer(http):
-    answer = http.get("/half")
-    assert answer.status_code == 422
-    assert answer.json()["field"] == "?"
 
 
 def test_a_client_that_leaves_is_no_error_of_the_service(http, caplog):

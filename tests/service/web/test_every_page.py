@@ -1,11 +1,7 @@
 """Every page: axe finds nothing serious, nothing scrolls sideways, no request leaves the service."""
 
-import io
-
 import httpx
-import numpy as np
 import pytest
-from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import expect
 
 from bentray_kernels.errors import InvalidInput
@@ -15,14 +11,12 @@ from bentray_workers.files.dataset import write_dataset
 from ...kernels.acquisition.traces import scan as trace_scan
 from ...waiting import wait_until
 from ..conftest import PATIENCE_S
+from .conftest import serious
 from .finished_results import finished, known
-from .live_results import in_turns, started, uploaded
+from .live_results import in_turns, started, stored_volume, uploaded
 
 pytestmark = [pytest.mark.browser, pytest.mark.nightly]
 
-# Ends of the addresses of pages whose parts axe has seen in another one.
-REPEATED = ("?planes=3", "?mode=swipe")
-SERIOUS = ("serious", "critical")
 # WCAG 2.2 AA with what it includes; in the dark what depends on colours.
 LEVELS = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
 RULES = {
@@ -38,8 +32,8 @@ SIZES = ((NARROWEST, TELEPHONE), ((3840, 2160), LAPTOP))
 def places(shared_service):
     """The address of a service, and every page with a text that is there once it is complete."""
     address, scan, work, monkeypatch, folder = shared_service
-    plane = [finished(address, scan, work, monkeypatch, known((12, 10), seed)) for seed in (0, 1)]
-    volume = finished(address, scan, work, monkeypatch, known((6, 5, 4)))
+    plane = [finished(shared_service, known((12, 10), seed)) for seed in (0, 1)]
+    volume = finished(shared_service, known((6, 5, 4)))
     write_dataset(folder / "traced.h5", trace_scan(elements=12))
     sent = uploaded(address, folder / "traced.h5")
     work.error = InvalidInput("settings", "no finite speed at 3 nodes", "smaller relaxation")
@@ -50,10 +44,7 @@ def places(shared_service):
     for number in (1, 2):
         turns.put(None)
         until(address, live, lambda job, number=number: len(job["history"]) == number)
-    values = io.BytesIO()
-    np.save(values, sampled(ONE_HOLE, 12))
-    binary = {"Content-Type": "application/octet-stream"}
-    ball = httpx.post(f"{address}/v1/volumes", content=values.getvalue(), headers=binary).json()
+    ball = stored_volume(address, sampled(ONE_HOLE, 12))
     marks = "profile=-8,-15,0,-5&ellipse=-8,-15,0,-5"
     return address, {
         "/": "Sixteen elements",
@@ -93,19 +84,6 @@ def opened(page, address, path, text):
         page.locator("#correct-error").get_by_text("changes nothing").wait_for()
 
 
-def serious(page, path, scheme):
-    """Serious findings of axe in this page: the parts, by the name of the rule."""
-    report = Axe().run(page, options=RULES[scheme]).response
-    assert report["passes"], path
-    return {
-        f"{path.partition('?')[0]} {scheme} {page.viewport_size['width']} {rule['id']}": [
-            node["html"][:120] for node in rule["nodes"][:3]
-        ]
-        for rule in report["violations"]
-        if rule["impact"] in SERIOUS
-    }
-
-
 def show_alerts(page):
     """The messages that the shell shows when a key ends, and when the service is away."""
     page.evaluate("document.dispatchEvent(new CustomEvent('locked', { detail: 'The key has expired' }))")
@@ -122,34 +100,13 @@ def sideways(page, path, *sizes):
     return results
 
 
-def test_every_page_on_a_laptop_and_on_the_narrowest_telephone(page, places):
-    """Each page once: axe finds nothing serious, nothing scrolls sideways, no request leaves the service."""
-    address, pages = places
-    results, wide, asked = {}, [], []
-    page.on("request", lambda request: asked.append(request.url))
-    page.emulate_media(color_scheme="light")
-    for path, text in pages.items():
-        resized(page, LAPTOP)
-        opened(page, address, path, text)
-        wide += sideways(page, path, LAPTOP, NARROWEST)
-        resized(page, LAPTOP)
-        if not path.endswith(REPEATED):
-            if path == "/jobs":
-                show_alerts(page)
-            results |= serious(page, path, "light")
-    assert results == {}
-    assert wide == []
-    assert len(asked) > len(pages)
-    own = (f"{address}/", f"blob:{address}/", "data:")
-    assert [request for request in asked if not request.startswith(own) and request != "about:blank"] == []
-    expect(page.locator("h1")).to_have_count(1)
-
-
 @pytest.mark.parametrize("scheme", RULES)
 def test_axe_finds_nothing_serious_in_any_colours_or_width(page, places, scheme):
+    """And no request leaves the service."""
     address, pages = places
     page.emulate_media(color_scheme=scheme)
-    results = {}
+    results, asked = {}, []
+    page.on("request", lambda request: asked.append(request.url))
     for path, text in pages.items():
         resized(page, LAPTOP)
         opened(page, address, path, text)
@@ -157,8 +114,13 @@ def test_axe_finds_nothing_serious_in_any_colours_or_width(page, places, scheme)
             show_alerts(page)
         for size in (LAPTOP, TELEPHONE):
             resized(page, size)
-            results |= serious(page, path, scheme)
+            found = serious(page, RULES[scheme])
+            results |= {f"{path} {size[0]} {rule}": parts for rule, parts in found.items()}
+        expect(page.locator("h1")).to_have_count(1)
     assert results == {}
+    assert len(asked) > len(pages)
+    own = (f"{address}/", f"blob:{address}/", "data:", "about:blank")
+    assert [request for request in asked if not request.startswith(own)] == []
 
 
 def test_nothing_scrolls_sideways_at_any_width(page, places):

@@ -1,10 +1,8 @@
 """The page of one job: what it made, and its place in the queue."""
 
-import io
 import time
 
 import httpx
-import numpy as np
 import pytest
 from PIL import Image
 from playwright.sync_api import expect
@@ -12,7 +10,7 @@ from playwright.sync_api import expect
 from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_service.jobs import kinds
 
-from .live_results import started
+from .live_results import started, stored_volume
 
 pytestmark = pytest.mark.browser
 
@@ -26,13 +24,9 @@ def two_frames(client, path, turntable, target, work_dir, **control):
 @pytest.mark.nightly
 def test_a_turntable_is_shown_and_plays_when_asked(page, address, work, monkeypatch):
     monkeypatch.setattr(kinds, "draw_turntable", two_frames)
-    values = io.BytesIO()
-    np.save(values, sampled(ONE_HOLE, 12))
-    stream = {"Content-Type": "application/octet-stream"}
-    sent = httpx.post(f"{address}/v1/volumes", content=values.getvalue(), headers=stream, timeout=60).json()
     asked = {
         "kind": "refraction",
-        "volume": sent["id"],
+        "volume": stored_volume(address, sampled(ONE_HOLE, 12))["id"],
         "settings": {"frames": 5, "width": 300, "iso": [0.3, 0.6], "index": [1.3, 1.4]},
     }
     made = httpx.post(f"{address}/v1/jobs", json=asked).json()

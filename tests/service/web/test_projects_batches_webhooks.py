@@ -4,13 +4,13 @@ from contextlib import closing
 
 import httpx
 import pytest
-from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import expect
 
 from bentray_service.rows.database import open_database
 from bentray_service.rows.deliveries import WebhookSecrets
 from bentray_service.rows.ids import LOCAL
 
+from .conftest import serious
 from .live_results import uploaded
 
 pytestmark = pytest.mark.browser
@@ -28,12 +28,6 @@ def address(shared_service):
         file = shared_service.scan(lambda file, name=name: file.attrs.modify("title", name))
         uploaded(shared_service.address, file)
     return shared_service.address
-
-
-def serious(page):
-    """What axe finds on the page as it is, menus and details open."""
-    found = Axe().run(page).response["violations"]
-    return {one["id"]: one["nodes"][0]["html"] for one in found if one["impact"] in ("serious", "critical")}
 
 
 def members(address):

@@ -5,7 +5,6 @@ import re
 import time
 from urllib.parse import parse_qs, urlsplit
 
-import httpx
 import numpy as np
 import pytest
 from PIL import Image
@@ -13,6 +12,8 @@ from playwright.sync_api import expect
 
 from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_service.jobs import kinds
+
+from .live_results import stored_volume
 
 pytestmark = pytest.mark.browser
 
@@ -37,11 +38,7 @@ def settings_of(address):
 @pytest.fixture(scope="module")
 def stored(shared_service):
     """The address of the view of a ball with a hole."""
-    values = io.BytesIO()
-    np.save(values, sampled(ONE_HOLE, 12))
-    stream = {"Content-Type": "application/octet-stream"}
-    address = f"{shared_service.address}/v1/volumes"
-    volume = httpx.post(address, content=values.getvalue(), headers=stream, timeout=60).json()
+    volume = stored_volume(shared_service.address, sampled(ONE_HOLE, 12))
     return f"{shared_service.address}/#/rendering/{volume['id']}"
 
 

@@ -35,25 +35,15 @@ MORE = {
 @pytest.fixture(scope="module")
 def result(shared_service):
     """The address of a result in a plane, for tests that leave it as it is."""
-    address, scan, work, monkeypatch, _ = shared_service
-    return f"{address}/#/jobs/{finished(address, scan, work, monkeypatch, SPEED, **MORE)}"
+    return f"{shared_service.address}/#/jobs/{finished(shared_service, SPEED, **MORE)}"
 
 
 @pytest.fixture
-def own_result(address, scan, work, monkeypatch):
-    """The address of a result in a plane that a test may change."""
-    return f"{address}/#/jobs/{finished(address, scan, work, monkeypatch, SPEED, **MORE)}"
-
-
-@pytest.fixture
-def volume(shared_service):
-    """The address of a volume with these values."""
-
-    def make(values):
-        address, scan, work, monkeypatch, _ = shared_service
-        return f"{address}/#/jobs/{finished(address, scan, work, monkeypatch, values)}"
-
-    return make
+def made(shared_service):
+    """The address of a result of these values that a test may change."""
+    return lambda *given, **more: (
+        f"{shared_service.address}/#/jobs/{finished(shared_service, *given, **more)}"
+    )
 
 
 def ready(page, address):
@@ -137,12 +127,10 @@ def test_the_attenuation_is_in_decibels_per_centimetre(page, result):
 
 
 @pytest.mark.nightly
-def test_the_resolution_is_the_recovered_fraction(page, shared_service):
+def test_the_resolution_is_the_recovered_fraction(page, made):
     """With the same colours from nothing to all, whatever its values are."""
-    address, scan, work, monkeypatch, _ = shared_service
     recovered = np.linspace(0.2, 0.9, SPEED.size).reshape(SPEED.shape)
-    job = finished(address, scan, work, monkeypatch, SPEED, recovery=recovered)
-    ready(page, f"{address}/#/jobs/{job}")
+    ready(page, made(SPEED, recovery=recovered))
     expect(page.locator("#result-cautions")).to_be_empty()
     page.get_by_role("button", name="Resolution").click()
     page.locator(".colour-bar").get_by_text("recovered fraction of a checkerboard").wait_for()
@@ -156,15 +144,13 @@ def test_the_resolution_is_the_recovered_fraction(page, shared_service):
 
 
 @pytest.mark.nightly
-def test_the_uncertainty_fades_what_is_not_known(page, shared_service):
+def test_the_uncertainty_fades_what_is_not_known(page, made):
     """Opaque without uncertainty, clear where two deviations reach half the range of the colours."""
-    address, scan, work, monkeypatch, _ = shared_service
     spread = np.zeros(SPEED.shape)
     spread[8:], spread[16:] = 14.0, 35.0
     caution = "The standard deviations may be too small: <b>rays</b> gather."
     cautions = (Caution("bounds", "Cut off at 1800 m/s.", doubtful=True), Caution("uncertainty", caution))
-    job = finished(address, scan, work, monkeypatch, SPEED, uncertainty=spread, cautions=cautions)
-    ready(page, f"{address}/#/jobs/{job}?window=1430,1570")
+    ready(page, made(SPEED, uncertainty=spread, cautions=cautions) + "?window=1430,1570")
     expect(page.locator("#result-facts")).to_contain_text("m/s (1 sd), detail down to 5.9 mm, 2 cautions: ")
     expect(page.locator("#result-cautions p")).to_have_text(
         ["Doubtful result. Cut off at 1800 m/s.", caution]
@@ -222,9 +208,22 @@ def test_a_link_restores_the_view(page, result, browser):
         assert shots[0] == shots[1]
 
 
-def table_of(download):
+def saved(page, panel):
+    """Save what is measured in a panel as CSV; its rows."""
+    with page.expect_download() as download:
+        page.locator(f".measure.{panel}").get_by_role("button", name="Save as CSV").click()
     with download.value.path().open(newline="") as file:
         return list(csv.reader(file))
+
+
+def dragged(page, *points):
+    """Drag from the first of these points of the page over all others."""
+    page.mouse.move(*points[0])
+    page.mouse.down()
+    for point in points[1:]:
+        page.mouse.move(*point, steps=2)
+    page.mouse.up()
+    redrawn(page)
 
 
 @pytest.mark.nightly
@@ -236,9 +235,7 @@ def test_a_profile_is_the_linear_interpolation_of_the_array(page, result):
         page.get_by_label(f"Profile: {name}, mm").fill(str(value))
     page.get_by_label("Profile: y to, mm").press("Tab")
     page.get_by_role("img", name="Profile of sound speed").wait_for()
-    with page.expect_download() as download:
-        page.locator(".measure.profile").get_by_role("button", name="Save as CSV").click()
-    head, *rows = table_of(download)
+    head, *rows = saved(page, "profile")
     assert head[0] == "distance_mm"
     assert head[1].endswith("(m/s)")
     distance, value = np.array(rows, float).T
@@ -256,16 +253,11 @@ def test_a_profile_is_the_linear_interpolation_of_the_array(page, result):
 def test_the_statistics_of_a_dragged_region_are_those_of_its_nodes(page, result, shape):
     ready(page, result)
     page.get_by_label(shape).check()
-    canvas = page.locator("canvas.plane")
-    box = canvas.bounding_box()
-    page.mouse.move(box["x"] + 0.42 * box["width"], box["y"] + 0.31 * box["height"])
-    page.mouse.down()
-    page.mouse.move(box["x"] + 0.61 * box["width"], box["y"] + 0.67 * box["height"], steps=3)
-    page.mouse.up()
+    box = page.locator("canvas.plane").bounding_box()
+    corners = ((0.42, 0.31), (0.61, 0.67))
+    dragged(page, *((box["x"] + u * box["width"], box["y"] + v * box["height"]) for u, v in corners))
     page.get_by_text("Standard deviation (m/s)").wait_for()
-    with page.expect_download() as download:
-        page.locator(".measure.region").get_by_role("button", name="Save as CSV").click()
-    head, row = table_of(download)
+    head, row = saved(page, "region")
     said = dict(zip(head, row, strict=True))
     x0, y0, x1, y1 = (float(said[f"{edge}_mm"]) for edge in ("x0", "y0", "x1", "y1"))
     x, y = X0 + DX * np.arange(24)[:, None], Y0 + DY * np.arange(16)[None, :]
@@ -291,24 +283,17 @@ def test_dragging_sets_the_window_and_moves_the_image_and_two_fingers_zoom(page,
     box = page.locator("canvas.plane").bounding_box()
     x, y = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
 
-    def drag(right, down):
-        page.mouse.move(x, y)
-        page.mouse.down()
-        page.mouse.move(x + right, y + down, steps=2)
-        page.mouse.up()
-        redrawn(page)
-
     page.get_by_label("Window", exact=True).check()
-    drag(60, 0)
+    dragged(page, (x, y), (x + 60, y))
     expect(page.get_by_label("from", exact=True)).not_to_have_value("1430")
     half = 70.0 * np.exp(60 / 150)
     np.testing.assert_allclose(window_of(page), [1500.0 - half, 1500.0 + half], atol=0.01)
-    drag(0, -30)
+    dragged(page, (x, y), (x, y - 30))
     expect(page.get_by_label("to", exact=True)).not_to_have_value(f"{1500.0 + half:.6g}")
     np.testing.assert_allclose(window_of(page), np.add([1500.0 - half, 1500.0 + half], 0.2 * half), atol=0.01)
     page.get_by_label("Move", exact=True).check()
     before = node_below(page, 0.5, 0.5)[2]
-    drag(60, 30)
+    dragged(page, (x, y), (x + 60, y + 30))
     after = node_below(page, 0.5, 0.5)[2]
     scale = 60 / (before[0] - after[0])
     assert scale > 0.0
@@ -323,8 +308,7 @@ def test_dragging_sets_the_window_and_moves_the_image_and_two_fingers_zoom(page,
 
 
 @pytest.mark.nightly
-def test_a_region_has_the_contrast_of_the_truth_beside_its_own(page, shared_service):
-    address, scan, work, monkeypatch, _ = shared_service
+def test_a_region_has_the_contrast_of_the_truth_beside_its_own(page, made):
     # On a grid that has a node at each of the image.
     x, y = np.ogrid[-20.0:40.0, -30.0:30.0]
 
@@ -333,9 +317,7 @@ def test_a_region_has_the_contrast_of_the_truth_beside_its_own(page, shared_serv
         file["truth"].attrs.update(spacing_m=1e-3, origin_m=[-0.02, -0.03])
 
     spread = np.linspace(1.0, 9.0, SPEED.size).reshape(SPEED.shape)
-    job = finished(address, lambda: scan(with_truth), work, monkeypatch, SPEED, uncertainty=spread)
-    place = (-4.0, -12.0, 4.0, 2.0)
-    ready(page, f"{address}/#/jobs/{job}?ellipse={','.join(map(str, place))}")
+    ready(page, made(SPEED, with_truth, uncertainty=spread) + "?ellipse=-4,-12,4,2")
     table = page.locator(".statistics")
     expect(table.locator("tr").first).to_have_text("ResultTruth")
     expect(table).to_contain_text("Uncertainty of the mean (m/s)")
@@ -353,9 +335,7 @@ def test_a_region_has_the_contrast_of_the_truth_beside_its_own(page, shared_serv
     of_mean, of_truth = rows["Uncertainty of the mean (m/s)"]
     assert float(of_mean) == pytest.approx(spread[away <= 1.0].mean(), abs=0.006)
     assert of_truth == "\N{EN DASH}"
-    with page.expect_download() as download:
-        page.locator(".measure.region").get_by_role("button", name="Save as CSV").click()
-    head, *lines = table_of(download)
+    head, *lines = saved(page, "region")
     assert [line[0] for line in lines] == ["Result", "Truth"]
     assert float(lines[1][head.index("contrast")]) == pytest.approx(contrast, abs=0.006)
     assert [line[head.index("uncertainty")] != "" for line in lines] == [True, False]
@@ -364,9 +344,9 @@ def test_a_region_has_the_contrast_of_the_truth_beside_its_own(page, shared_serv
     expect(table.locator("td").first).to_have_text("1.0000")
 
 
-def test_distance_angle_and_area_are_those_of_their_points(page, volume):
+def test_distance_angle_and_area_are_those_of_their_points(page, made):
     values = known((8, 6, 5))
-    ready(page, volume(values))
+    ready(page, made(values))
 
     def click(*shares):
         points = []
@@ -384,9 +364,7 @@ def test_distance_angle_and_area_are_those_of_their_points(page, volume):
     one, vertex, other = click((0.45, 0.2), (0.5, 0.5), (0.6, 0.3))
     page.get_by_label("Area", exact=True).check()
     *outline, _ = click((0.4, 0.2), (0.6, 0.25), (0.55, 0.8), (0.42, 0.7), (0.4, 0.2))
-    with page.expect_download() as download:
-        page.locator(".measure.list").get_by_role("button", name="Save as CSV").click()
-    head, *rows = table_of(download)
+    head, *rows = saved(page, "list")
     length, angle, area = (dict(zip(head, row, strict=True)) for row in rows)
     # The second point lies in another slice.
     assert float(length["value"]) == pytest.approx(np.hypot(np.linalg.norm(across), 1e3 * SPACING_M[2]))
@@ -441,9 +419,9 @@ def test_the_image_is_used_by_keys_alone(page, result):
 
 
 @pytest.mark.nightly
-def test_slices_of_a_volume_and_three_planes_share_a_cursor(page, volume):
+def test_slices_of_a_volume_and_three_planes_share_a_cursor(page, made):
     values = known((8, 6, 5))
-    ready(page, volume(values))
+    ready(page, made(values))
     slider = page.get_by_label("Slice across z")
     slider.focus()
     page.keyboard.press("ArrowRight")
@@ -467,8 +445,8 @@ def test_slices_of_a_volume_and_three_planes_share_a_cursor(page, volume):
 
 
 @pytest.mark.nightly
-def test_scrubbing_draws_each_slice_from_the_values_in_the_page(page, volume):
-    ready(page, volume(known((8, 6, 5))))
+def test_scrubbing_draws_each_slice_from_the_values_in_the_page(page, made):
+    ready(page, made(known((8, 6, 5))))
     asked = []
     page.on("request", lambda request: asked.append(request.url))
     slider = page.get_by_label("Slice across z")
@@ -480,8 +458,8 @@ def test_scrubbing_draws_each_slice_from_the_values_in_the_page(page, volume):
 
 
 @pytest.mark.nightly
-def test_a_result_is_run_again_with_changes(page, own_result, work):
-    ready(page, own_result)
+def test_a_result_is_run_again_with_changes(page, made, shared_service):
+    ready(page, made(SPEED))
     page.get_by_role("link", name="Run again with changes").click()
     expect(page.get_by_label("Nodes per side")).to_have_value("16")
     expect(page.get_by_label("Method", exact=True)).to_have_value("sart")
@@ -489,7 +467,7 @@ def test_a_result_is_run_again_with_changes(page, own_result, work):
     page.get_by_role("button", name="Start").click()
     # The first one, which is listed below the new one, has succeeded long before.
     expect(page.locator(".job").get_by_text("succeeded")).to_have_count(2)
-    assert [call[1].nodes for call in work.calls] == [16, 20]
+    assert [call[1].nodes for call in shared_service.work.calls[-2:]] == [16, 20]
 
 
 def copied(page, name):
@@ -526,7 +504,8 @@ def test_the_copied_code_reads_the_values(page, result):
 
 
 @pytest.mark.nightly
-def test_a_result_is_exported_and_deleted(page, own_result):
+def test_a_result_is_exported_and_deleted(page, made):
+    own_result = made(SPEED, **MORE)
     ready(page, own_result)
     page.get_by_text("Export", exact=True).click()
     page.locator(".export select").select_option("coverage")
@@ -542,8 +521,8 @@ def test_a_result_is_exported_and_deleted(page, own_result):
 
 
 @pytest.mark.nightly
-def test_a_result_is_renamed(page, own_result):
-    ready(page, own_result)
+def test_a_result_is_renamed(page, made):
+    ready(page, made(SPEED))
     page.get_by_text("More", exact=True).click()
     page.get_by_role("button", name="Rename").click()
     page.get_by_label("Name", exact=True).fill("With the new water speed")

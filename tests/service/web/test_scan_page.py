@@ -6,7 +6,6 @@ from dataclasses import replace
 import httpx
 import numpy as np
 import pytest
-from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import expect
 
 from bentray_kernels.acquisition import speed_from_temperature
@@ -17,6 +16,7 @@ from bentray_workers.files.dataset import write_dataset
 from ...effort import effort
 from ...kernels.acquisition.traces import blob_delay
 from ...kernels.acquisition.traces import scan as trace_scan
+from .conftest import serious
 from .live_results import uploaded
 
 pytestmark = pytest.mark.browser
@@ -200,19 +200,6 @@ def test_cancel(page, address, scan, work):
     page.get_by_role("button", name="Fast").click()
     page.get_by_role("button", name="Cancel").click()
     page.locator(".state", has_text="cancelled").wait_for()
-
-
-# With all that comes before and after: test_story.py.
-@pytest.mark.nightly
-def test_by_keyboard_alone(page, address, scan, work):
-    sent(page, address, scan)
-    page.locator("#theme").focus()
-    for _ in range(20):
-        page.keyboard.press("Tab")
-        if page.evaluate("document.activeElement.id") == "start":
-            break
-    page.keyboard.press("Enter")
-    page.locator(".job").wait_for()
 
 
 def with_traces(address, folder):
@@ -428,5 +415,4 @@ def test_without_a_water_shot_there_is_none_to_choose(page, address, tmp_path):
     page.get_by_role("button", name="Edit name").click()
     for scheme in effort(["light"], ["light", "dark"]):
         page.emulate_media(color_scheme=scheme)
-        violations = Axe().run(page).response["violations"]
-        assert [one["id"] for one in violations if one["impact"] in ("serious", "critical")] == []
+        assert serious(page) == {}

@@ -129,41 +129,36 @@ def test_a_sample_scan_is_simulated_and_opened(page, address, monkeypatch):
     assert request == PhantomScan(**SAMPLE).chosen()
 
 
-def test_an_upload_goes_on_after_a_broken_connection_and_a_reload(page, address, scan):
-    """The first piece arrives, the second breaks off, and the page is loaded again."""
-    page.goto(address)
-    # Pieces of a few bytes, as if the file were large.
-    page.route(
-        "**/resumable_upload.js",
-        lambda route: route.fulfill(
-            response=(answer := route.fetch()), body=answer.text().replace("8 * 2 ** 20", "4096")
-        ),
-    )
+@pytest.fixture
+def in_pieces(page):
+    """Let the page send pieces of 4096 bytes, as if the file were large."""
+
+    def small(route):
+        answer = route.fetch()
+        route.fulfill(response=answer, body=answer.text().replace("8 * 2 ** 20", "4096"))
+
+    page.route("**/resumable_upload.js", small)
+
+
+def test_an_upload_goes_on_after_a_broken_connection(page, address, scan, in_pieces):
+    """The first piece arrives, and the second breaks off."""
     sent: list[int] = []
-
-    def broken(route):
-        sent.append(int(route.request.headers["upload-offset"]))
-        if len(sent) == 2:
-            route.abort()
-        else:
-            route.continue_()
-
     asked: list[str] = []
 
-    def unready(route):
+    def broken(route):
         asked.append(route.request.method)
+        if asked[-1] == "PATCH":
+            sent.append(int(route.request.headers["upload-offset"]))
+        if asked[-1] == "PATCH" and len(sent) == 2:
+            route.abort()
         # As nginx answers for a service that restarts.
-        if asked.count("HEAD") == 1:
+        elif asked[-1] == "HEAD" and asked.count("HEAD") == 1:
             route.fulfill(status=502)
         else:
             route.continue_()
 
-    page.route(
-        "**/v1/uploads/*",
-        lambda route: broken(route) if route.request.method == "PATCH" else unready(route),
-    )
+    page.route("**/v1/uploads/*", broken)
     page.goto(address)
-    page.reload()
     file = scan()
     page.set_input_files("#scan-file", file)
     page.get_by_role("heading", name="Sixteen elements").wait_for()
@@ -173,7 +168,7 @@ def test_an_upload_goes_on_after_a_broken_connection_and_a_reload(page, address,
 
 
 @pytest.mark.nightly
-def test_an_upload_that_a_closed_page_left_is_continued(page, address, scan):
+def test_an_upload_that_a_closed_page_left_is_continued(page, address, scan, in_pieces):
     file = scan()
     page.goto(address)
     offsets: list[int] = []
@@ -184,14 +179,7 @@ def test_an_upload_that_a_closed_page_left_is_continued(page, address, scan):
         offsets.append(int(route.request.headers["upload-offset"]))
         return route.continue_() if offsets[-1] == 0 or len(offsets) > 2 else None
 
-    page.route(
-        "**/resumable_upload.js",
-        lambda route: route.fulfill(
-            response=(answer := route.fetch()), body=answer.text().replace("8 * 2 ** 20", "4096")
-        ),
-    )
     page.route("**/v1/uploads/*", first_piece_only)
-    page.reload()
     page.set_input_files("#scan-file", file)
     while len(offsets) < 2:
         page.wait_for_timeout(50)
