@@ -1,5 +1,6 @@
 """Debian's Chromium, and a page in it that must raise no error and keep to the Content-Security-Policy."""
 
+import base64
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
@@ -63,6 +64,32 @@ def serious(page: Any, options: dict[str, Any] | None = None) -> dict[str, list[
         for rule in report["violations"]
         if rule["impact"] in ("serious", "critical")
     }
+
+
+def tab_to(page: Any, goal: Any) -> None:
+    """Press Tab until the first element of a locator has the focus."""
+    goal.first.wait_for(state="attached")
+    for _ in range(120):
+        page.keyboard.press("Tab")
+        if goal.first.evaluate("it => it === document.activeElement"):
+            return
+    raise AssertionError(f"{goal} has not been reached")
+
+
+DROP = """([selector, files]) => {
+    const dataTransfer = new DataTransfer();
+    for (const [name, text] of files) {
+        dataTransfer.items.add(new File([Uint8Array.from(atob(text), (one) => one.charCodeAt(0))], name));
+    }
+    const drop = new DragEvent("drop", { dataTransfer, bubbles: true, cancelable: true });
+    document.querySelector(selector).dispatchEvent(drop);
+}"""
+
+
+def drop(page: Any, selector: str, **files: bytes) -> None:
+    """Drop files on an element, as if from the desktop: the contents of HDF5 files by their names."""
+    contents = [[f"{name}.h5", base64.b64encode(content).decode()] for name, content in files.items()]
+    page.evaluate(DROP, [selector, contents])
 
 
 class SharedService(NamedTuple):

@@ -6,6 +6,7 @@ from playwright.sync_api import expect
 
 from bentray_kernels.errors import InvalidInput
 
+from .conftest import tab_to
 from .live_results import ITERATIONS, SHAPE, in_turns, started
 
 pytestmark = pytest.mark.browser
@@ -20,16 +21,6 @@ def colour_at(canvas, x, y):
     """Red, green and blue of a pixel of a canvas."""
     pixel = "(it, [x, y]) => [...it.getContext('2d').getImageData(x, y, 1, 1).data.slice(0, 3)]"
     return canvas.evaluate(pixel, [round(x), round(y)])
-
-
-def tab_to(page, text):
-    """Press Tab from the header on until an element with this text has the focus."""
-    page.locator("#skip").focus()
-    for _ in range(30):
-        page.keyboard.press("Tab")
-        if page.evaluate("document.activeElement.textContent") == text:
-            return
-    raise AssertionError(f"{text} has not been reached")
 
 
 def test_it_sharpens_until_the_result_is_shown(page, address, scan, turns):
@@ -85,13 +76,13 @@ def test_it_can_be_cancelled_and_run_again(page, address, scan, turns):
     job = started(address, scan)
     page.goto(f"{address}/#/jobs/{job['id']}")
     page.get_by_text("The image appears after the first iteration").wait_for()
-    tab_to(page, "Cancel")
+    tab_to(page, page.get_by_role("button", name="Cancel"))
     page.keyboard.press("Enter")
     page.get_by_text("Cancelled", exact=True).wait_for()
     again = page.get_by_role("link", name="Run again with changes")
     assert again.get_attribute("href") == f"#/scans/{job['dataset']}?from={job['id']}"
     assert page.locator("main .error:visible").count() == 0
-    tab_to(page, "Run again with changes")
+    tab_to(page, again)
     page.keyboard.press("Enter")
     expect(page.get_by_label("Nodes per side")).to_have_value("16")
 

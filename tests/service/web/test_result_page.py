@@ -16,7 +16,7 @@ from scipy.ndimage import map_coordinates
 
 from bentray_kernels.tomography import Caution
 
-from .conftest import PATIENCE_MS
+from .conftest import PATIENCE_MS, tab_to
 from .finished_results import ORIGIN_M, SPACING_M, finished, known
 
 pytestmark = pytest.mark.browser
@@ -385,10 +385,7 @@ def test_distance_angle_and_area_are_those_of_their_points(page, made):
 def test_the_image_is_used_by_keys_alone(page, result):
     ready(page, result)
     page.locator("#skip").focus()
-    for _ in range(40):
-        page.keyboard.press("Tab")
-        if page.evaluate("document.activeElement.className").startswith("plane"):
-            break
+    tab_to(page, page.locator("canvas.plane"))
     read = page.locator(".readout")
     expect(read).to_contain_text("node 12, 8")
     page.keyboard.press("ArrowRight")

@@ -1,7 +1,5 @@
 """The start page: upload a scan, error messages, and the list of scans."""
 
-import base64
-
 import httpx
 import pytest
 from playwright.sync_api import expect
@@ -11,6 +9,7 @@ from bentray_service.jobs import kinds
 from bentray_workers.simulation.request import SAMPLE, PhantomScan
 
 from ...workers.foreign_scans.scans import delta_tof, positions
+from .conftest import drop
 from .live_results import uploaded
 
 pytestmark = pytest.mark.browser
@@ -37,18 +36,7 @@ def test_several_files_are_dropped_beside_the_zone(page, serve, scan, tmp_path):
     page.goto(serve())
     page.get_by_text("No scan yet").wait_for()
     content = scan().read_bytes()
-    files = [["first.h5", content], ["notes.h5", b"only text"], ["second.h5", content]]
-    page.evaluate(
-        """(files) => {
-          const dataTransfer = new DataTransfer();
-          for (const [name, text] of files) {
-            dataTransfer.items.add(new File([Uint8Array.from(atob(text), (one) => one.charCodeAt(0))], name));
-          }
-          const drop = new DragEvent("drop", { dataTransfer, bubbles: true, cancelable: true });
-          document.querySelector("h1").dispatchEvent(drop);
-        }""",
-        [[name, base64.b64encode(one).decode()] for name, one in files],
-    )
+    drop(page, "h1", first=content, notes=b"only text", second=content)
     page.get_by_text("3 of 3: second.h5 is stored").wait_for()
     expect(page.locator("#scan-error")).to_contain_text("notes.h5 is not a scan that can be read. ")
     expect(page.locator("#scans li")).to_have_count(2)

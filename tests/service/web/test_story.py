@@ -1,7 +1,5 @@
 """From a dropped file to an export in a browser, with a service and a worker as processes of their own."""
 
-import base64
-
 import httpx
 import nibabel
 import numpy as np
@@ -14,22 +12,13 @@ from bentray_workers.files.dataset import write_dataset
 from ...faults.live_service import LiveService
 from ...faults.machine import wait_until
 from ...table6 import table6_scan
-from .conftest import PATIENCE_MS
+from .conftest import PATIENCE_MS, drop, tab_to
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 ELEMENTS = 32
 # So many iterations that the service can be killed between two of them.
 SETTINGS = Settings.from_values(method="sart", nodes=64, iterations=48)
-
-# Drops a file on an element, as if from the desktop.
-DROP = """([text, name]) => {
-    const bytes = Uint8Array.from(atob(text), one => one.charCodeAt(0));
-    const dataTransfer = new DataTransfer();
-    dataTransfer.items.add(new File([bytes], name));
-    const drop = new DragEvent("drop", { dataTransfer, bubbles: true });
-    document.getElementById("scan-drop").dispatchEvent(drop);
-}"""
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +44,7 @@ def enter(page, service, tenant):
 def dropped(page, scan, folder):
     write_dataset(folder / "breast.h5", scan)
     page.locator("#scan-drop").wait_for()
-    page.evaluate(DROP, [base64.b64encode((folder / "breast.h5").read_bytes()).decode(), "breast.h5"])
+    drop(page, "#scan-drop", breast=(folder / "breast.h5").read_bytes())
     page.wait_for_url("**/#/scans/*")
 
 
@@ -94,16 +83,6 @@ def test_from_a_dropped_file_over_a_killed_service_to_an_export(page, service, b
     np.testing.assert_allclose(
         np.squeeze(nibabel.load(tmp_path / "speed.nii").get_fdata()), undisturbed, rtol=1e-6
     )
-
-
-def tab_to(page, goal):
-    """Press Tab until an element has the focus."""
-    goal.first.wait_for(state="attached")
-    for _ in range(120):
-        page.keyboard.press("Tab")
-        if goal.first.evaluate("it => it === document.activeElement"):
-            return
-    raise AssertionError(f"{goal} has not been reached")
 
 
 def test_the_whole_story_by_keyboard_alone(page, service, breast, tmp_path):
