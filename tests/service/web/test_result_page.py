@@ -419,7 +419,12 @@ def test_the_image_is_used_by_keys_alone(page, result):
 def test_slices_of_a_volume_and_three_planes_share_a_cursor(page, made):
     values = known((8, 6, 5))
     ready(page, made(values))
+    asked = []
+    page.on("request", lambda request: asked.append(request.url))
     slider = page.get_by_label("Slice across z")
+    for index in (0, 4, 2):
+        slider.fill(str(index))
+        page.get_by_text(f"Slice {index} of 0 to 4").wait_for()
     slider.focus()
     page.keyboard.press("ArrowRight")
     page.get_by_text("Slice 3 of 0 to 4, z = 14 mm").wait_for()
@@ -439,18 +444,7 @@ def test_slices_of_a_volume_and_three_planes_share_a_cursor(page, made):
     page.mouse.up()
     page.get_by_text(f"Slice {node[0]} of 0 to 7").wait_for()
     page.get_by_text(f"Slice {node[1]} of 0 to 5").wait_for()
-
-
-@pytest.mark.nightly
-def test_scrubbing_draws_each_slice_from_the_values_in_the_page(page, made):
-    ready(page, made(known((8, 6, 5))))
-    asked = []
-    page.on("request", lambda request: asked.append(request.url))
-    slider = page.get_by_label("Slice across z")
-    for index in (0, 4, 1):
-        slider.fill(str(index))
-        page.get_by_text(f"Slice {index} of 0 to 4").wait_for()
-    # Others may come at any time: for the icon of the tab, and for the health of the service.
+    # From the values in the page; other requests may come at any time: for an icon, for the health.
     assert [request for request in asked if "/v1/volumes/" in request] == []
 
 
@@ -501,9 +495,17 @@ def test_the_copied_code_reads_the_values(page, result):
 
 
 @pytest.mark.nightly
-def test_a_result_is_exported_and_deleted(page, made):
+def test_a_result_is_renamed_exported_and_deleted(page, made):
     own_result = made(SPEED, **MORE)
     ready(page, own_result)
+    page.get_by_text("More", exact=True).click()
+    page.get_by_role("button", name="Rename").click()
+    page.get_by_label("Name", exact=True).fill("With the new water speed")
+    page.locator("#rename").get_by_role("button", name="Rename").click()
+    expect(page.get_by_role("heading", level=1)).to_have_text("With the new water speed")
+    page.get_by_role("navigation").get_by_role("link", name="Jobs").click()
+    page.get_by_role("main").get_by_role("link", name="With the new water speed").click()
+    expect(page.get_by_role("heading", level=1)).to_have_text("With the new water speed")
     page.get_by_text("Export", exact=True).click()
     page.locator(".export select").select_option("coverage")
     with page.expect_download() as download:
@@ -515,20 +517,6 @@ def test_a_result_is_exported_and_deleted(page, made):
     page.get_by_role("button", name="Delete").click()
     page.get_by_role("heading", name="Jobs").wait_for()
     assert httpx.get(own_result.replace("/#/jobs/", "/v1/jobs/")).status_code == 404
-
-
-@pytest.mark.nightly
-def test_a_result_is_renamed(page, made):
-    ready(page, made(SPEED))
-    page.get_by_text("More", exact=True).click()
-    page.get_by_role("button", name="Rename").click()
-    page.get_by_label("Name", exact=True).fill("With the new water speed")
-    page.locator("#rename").get_by_role("button", name="Rename").click()
-    expect(page.get_by_role("heading", level=1)).to_have_text("With the new water speed")
-    page.reload()
-    expect(page.get_by_role("heading", level=1)).to_have_text("With the new water speed")
-    page.get_by_role("navigation").get_by_role("link", name="Jobs").click()
-    page.get_by_role("main").get_by_role("link", name="With the new water speed").wait_for()
 
 
 @pytest.mark.nightly

@@ -33,47 +33,44 @@ def sent(page, address, scan):
 
 # With a key: the first test of test_shell.py.
 @pytest.mark.nightly
-def test_upload_start_watch(page, address, scan, work):
+def test_changed_settings_are_sent_and_the_job_is_watched(page, address, scan, work):
     sent(page, address, scan)
     page.get_by_text("All settings").click()
     page.get_by_label("Method", exact=True).select_option("SART")
     page.get_by_label("Rays", exact=True).select_option("Straight")
     page.get_by_label("Nodes per side").fill("32")
+    page.get_by_text("Advanced").click()
+    page.get_by_label("Iterations").fill("2")
+    page.get_by_label("Speed bounds, highest").fill("1700")
+    page.get_by_label("Check the scan first").uncheck()
     work.hold.clear()
-    page.get_by_role("button", name="Start").click()
+    with page.expect_request("**/v1/jobs") as asked:
+        page.get_by_role("button", name="Start").click()
+    assert asked.value.post_data_json["settings"] == {
+        "method": "sart",
+        "rays": "straight",
+        "nodes": 32,
+        "iterations": 2,
+        "speed_bounds_mps": [1300, 1700],
+        "picking": {"examine": False},
+    }
     job = page.locator(".job")
     job.get_by_text("running").wait_for()
     work.hold.set()
     job.get_by_text("succeeded").wait_for()
     job.get_by_text("residual 2,000 ns").wait_for()
     assert job.get_by_role("heading", name="Straight rays").is_visible()
-    assert work.calls[0][1].nodes == 32
+    settings = work.calls[0][1]
+    assert (settings.method, settings.nodes, settings.iterations) == ("sart", 32, 2)
     image = job.locator("img")
     image.scroll_into_view_if_needed()
     expect(image).not_to_have_js_property("naturalWidth", 0)
     assert page.get_by_text("Nothing has run yet").is_hidden()
-
-
-@pytest.mark.nightly
-def test_only_changed_settings_are_sent(page, address, scan, work):
-    sent(page, address, scan)
-    page.get_by_text("All settings").click()
-    page.get_by_text("Advanced").click()
-    page.get_by_label("Iterations").fill("2")
-    page.get_by_label("Strength of the penalty").fill("0.25")
-    page.get_by_label("Speed bounds, highest").fill("1700")
-    page.get_by_label("Check the scan first").uncheck()
-    with page.expect_request("**/v1/jobs") as asked:
-        page.get_by_role("button", name="Start").click()
-    assert asked.value.post_data_json["settings"] == {
-        "iterations": 2,
-        "gauss_newton": {"penalty_strength": 0.25},
-        "speed_bounds_mps": [1300, 1700],
-        "picking": {"examine": False},
-    }
-    page.locator(".job").get_by_text("succeeded").wait_for()
-    settings = work.calls[0][1]
-    assert (settings.method, settings.iterations, settings.gauss_newton.penalty_strength) == ("auto", 2, 0.25)
+    # Another one is cancelled here; on the page of a job: test_live_page.py.
+    work.hold.clear()
+    page.get_by_role("button", name="Fast").click()
+    page.get_by_role("button", name="Cancel").click()
+    page.locator(".state", has_text="cancelled").wait_for()
 
 
 @pytest.mark.nightly
@@ -190,16 +187,6 @@ def test_a_volume_in_space_is_shown_as_glass(page, address, scan, work, monkeypa
         "?iso=1520&outside=1&index=0.974&surroundings=0&elevation_deg=35"
     )
     expect(page.get_by_text("Volume rendering", exact=True).and_(page.locator("#jobs *"))).to_have_count(1)
-
-
-# On the page of a job: test_live_page.py.
-@pytest.mark.nightly
-def test_cancel(page, address, scan, work):
-    sent(page, address, scan)
-    work.hold.clear()
-    page.get_by_role("button", name="Fast").click()
-    page.get_by_role("button", name="Cancel").click()
-    page.locator(".state", has_text="cancelled").wait_for()
 
 
 def with_traces(address, folder):

@@ -56,19 +56,6 @@ def test_page_requests_and_sends_a_key(page, serve, scan, work, tmp_path):
     assert httpx.get(f"{address}/v1/datasets").status_code == 401
 
 
-def test_every_page_opens_by_its_address(page, shared_service):
-    for path, heading in (
-        ("/", "Scans"),
-        ("/jobs", "Jobs"),
-        ("/rendering", "Volume rendering"),
-        ("/surfaces", "Surface rendering"),
-        ("/service", "Service"),
-    ):
-        page.goto(f"{shared_service.address}/#{path}")
-        page.get_by_role("heading", level=1, name=heading, exact=True).wait_for()
-        assert page.locator("main .error:visible").count() == 0
-
-
 def test_unknown_addresses_are_named(page, shared_service):
     address = shared_service.address
     page.goto(f"{address}/#/nowhere")
