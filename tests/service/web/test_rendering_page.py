@@ -46,7 +46,6 @@ def stored(shared_service):
 def ball(page, stored):
     page.goto(stored)
     whole(page)
-    return page
 
 
 def test_a_volume_is_uploaded_looked_at_and_turned(page, serve, work, tmp_path, monkeypatch):
@@ -88,19 +87,7 @@ def test_a_volume_is_uploaded_looked_at_and_turned(page, serve, work, tmp_path, 
 
 
 @pytest.mark.nightly
-def test_the_filter_is_chosen(ball):
-    page = ball
-    page.route("**/*filter=*", lambda route: route.abort())
-    with page.expect_request(re.compile("refraction.png.*filter=catmull-rom&")):
-        page.get_by_label("Filter").select_option("catmull-rom")
-    expect(page.locator("#look-error")).to_have_text("The service does not answer.")
-    page.get_by_label("Filter").select_option("B-spline 3")
-    expect(page.locator("#look-error")).to_be_hidden()
-
-
-@pytest.mark.nightly
-def test_dragging_turns_the_view_and_full_quality_follows(ball):
-    page = ball
+def test_dragging_turns_the_view_and_full_quality_follows(page, ball):
     before = whole(page, azimuth_deg="30").evaluate("canvas => canvas.toDataURL()")
     box = page.locator("#stage").bounding_box()
     page.mouse.move(box["x"] + 200, box["y"] + 200)
@@ -129,8 +116,7 @@ def test_dragging_turns_the_view_and_full_quality_follows(ball):
 
 
 @pytest.mark.nightly
-def test_the_view_is_turned_by_keyboard_and_kept_in_the_address(ball):
-    page = ball
+def test_the_view_is_turned_by_keyboard_and_kept_in_the_address(page, ball):
     page.locator("#stage").focus()
     for key in ("ArrowRight", "ArrowRight", "Shift+ArrowUp", "+"):
         page.keyboard.press(key)
@@ -147,8 +133,7 @@ def test_the_view_is_turned_by_keyboard_and_kept_in_the_address(ball):
 
 
 @pytest.mark.nightly
-def test_two_requests_at_most_and_the_newest_view_wins(ball):
-    page = ball
+def test_two_requests_at_most_and_the_newest_view_wins(page, ball):
     requested, under_way, most = [], set(), []
 
     def begin(request):
@@ -188,8 +173,7 @@ def test_two_requests_at_most_and_the_newest_view_wins(ball):
 
 
 @pytest.mark.nightly
-def test_a_preview_that_comes_late_is_not_shown(ball):
-    page = ball
+def test_a_preview_that_comes_late_is_not_shown(page, ball):
     content = io.BytesIO()
     Image.new("RGB", (8, 8), "red").save(content, "PNG")
     held = []
@@ -240,8 +224,13 @@ def test_an_iso_value_is_chosen_by_its_histogram(page, address, tmp_path):
 
 
 @pytest.mark.nightly
-def test_display_errors_are_shown_as_text(ball, tmp_path):
-    page = ball
+def test_display_errors_are_shown_as_text(page, ball, tmp_path):
+    page.route("**/*filter=*", lambda route: route.abort())
+    with page.expect_request(re.compile("refraction.png.*filter=catmull-rom&")):
+        page.get_by_label("Filter").select_option("catmull-rom")
+    expect(page.locator("#look-error")).to_have_text("The service does not answer.")
+    page.get_by_label("Filter").select_option("B-spline 3")
+    expect(page.locator("#look-error")).to_be_hidden()
     page.get_by_label("Iso-value", exact=True).fill("7")
     page.get_by_label("Iso-value", exact=True).press("Tab")
     expect(page.locator("#look-error")).to_contain_text("iso: found 7; accepted: ")

@@ -46,35 +46,34 @@ function Accuracy({ address, onError }) {
   return html`<${Pairs} className="errors" caption="Error of the geometry field, per cent of the edge of its cube" rows=${rows} />`;
 }
 
+// The objects of a scene where the values of the form place them.
+function placedIn(values) {
+  return objectsOf(values.scene).map((object, number) => ({ ...object, x: Number(values[`x${number}`]), y: Number(values[`y${number}`]) }));
+}
+
 // The view that the values of the form state: without what the material shows nothing of, which the service refuses, and with the places of
 // the objects once one of them was moved.
 function viewOf({ samples, ...values }) {
   if (!values.mode.startsWith("refract")) delete values.index;
   if (values.mode === "diffuse") delete values.share;
-  const standing = objectsOf(values.scene);
-  const names = standing.flatMap((_, number) => [`x${number}`, `y${number}`]);
-  const places = names.map((name) => Number(values[name]));
-  for (const name of names) delete values[name];
-  const moved = standing.flatMap(({ x, y }) => [x, y]).some((place, index) => place !== places[index]);
-  return { ...values, ...(moved && { positions_m: places }) };
+  const [standing, places] = [objectsOf(values.scene), placedIn(values)].map((objects) => objects.flatMap(({ x, y }) => [x, y]));
+  for (const name of Object.keys(values)) if (/^[xy]\d/.test(name)) delete values[name];
+  return { ...values, ...(places.join() !== standing.join() && { positions_m: places }) };
 }
 
 // What moves the object that is shown at a point of the stage over the ground, as far as the pointer goes: a function of its points; null where
 // there is none. values(): of the form; move(number, [x, y]) moves an object.
 function grabObject(point, stage, values, move) {
-  const numbers = (names) => Object.fromEntries(names.map((name) => [name, Number(values()[name])]));
-  const camera = () => ({ scene: values().scene, ...numbers(CAMERA) });
-  const placed = () => objectsOf(values().scene).map((object, number) => ({ ...object, x: Number(values()[`x${number}`]), y: Number(values()[`y${number}`]) }));
   const inPicture = ([px, py]) => [px / stage.clientWidth - 0.5, py / stage.clientHeight - 0.5];
-  const objects = placed();
-  const number = objects.length ? objectAt(camera(), objects, ...inPicture(point)) : -1;
+  const objects = placedIn(values());
+  const number = objects.length ? objectAt(values(), objects, ...inPicture(point)) : -1;
   if (number < 0) return null;
-  const at = (to) => placeAt(camera(), ...inPicture(to), objects[number].size / 2);
+  const at = (to) => placeAt(values(), ...inPicture(to), objects[number].size / 2);
   let last = at(point);
   return last && ((to) => {
     const place = at(to);
     if (!place) return;
-    const { x, y } = placed()[number];
+    const { x, y } = placedIn(values())[number];
     move(number, [x + place[0] - last[0], y + place[1] - last[1]]);
     last = place;
   });

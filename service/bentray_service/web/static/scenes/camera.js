@@ -26,7 +26,8 @@ export function frameOf(azimuthDeg, elevationDeg) {
 
 const plus = (a, b, by) => a.map((one, axis) => one + by * b[axis]);
 
-// The eye of a camera, and the direction in which it sees a point of a square picture, u and v from -1/2 to 1/2 right and down.
+// The eye of a camera, whose numbers may be the texts of a form, and the direction in which it sees a point of a square picture, u and v from -1/2 to
+// 1/2 right and down.
 function rayAt({ scene, azimuth_deg: azimuth, elevation_deg: elevation, zoom }, u, v) {
   const { centre, radius } = FRAMINGS[scene];
   const { right, down, ahead } = frameOf(azimuth, elevation);
