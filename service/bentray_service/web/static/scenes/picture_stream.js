@@ -24,29 +24,21 @@ export class PictureStream {
     Object.assign(this, { lastMs: Infinity, lastPreview: -Infinity, interval: 0 });
   }
 
-  // The view moves: addresses of its preview and of its full picture; drawHere, if given, draws the preview on the canvas and returns whether
-  // it did.
-  move(preview, full, drawHere = null) {
-    this.want({ preview, full, drawHere, moved: performance.now() });
-  }
-
-  // The view has changed at once.
-  set(full) {
+  // Shows a view, which moves or has changed at once. preview, full: addresses of its pictures; drawHere, if given, draws the preview on the
+  // canvas and returns whether it did.
+  show({ preview, full, drawHere }, moving) {
     const { wanted } = this;
-    if (wanted?.full !== full || (wanted.shown !== "full" && wanted.preview)) this.want({ preview: "", full, moved: -Infinity });
+    if (!moving && wanted?.full === full && (wanted.shown === "full" || !wanted.moves)) return;
+    this.views += 1;
+    this.wanted = { preview, full, drawHere, moves: moving, moved: moving ? performance.now() : -Infinity, number: this.views, requested: "", shown: "" };
+    for (const { quality, controller } of this.underWay) if (quality === "full") controller.abort();
+    this.next();
   }
 
   close() {
     this.wanted = null;
     clearTimeout(this.timer);
     for (const { controller } of this.underWay) controller.abort();
-  }
-
-  want(view) {
-    this.views += 1;
-    this.wanted = { ...view, number: this.views, requested: "", shown: "" };
-    for (const { quality, controller } of this.underWay) if (quality === "full") controller.abort();
-    this.next();
   }
 
   next() {
@@ -60,7 +52,7 @@ export class PictureStream {
     const left = wanted.moved + REST_MS - now;
     const free = this.underWay.size < (this.lastMs < QUICK_MS ? MAX_UNDER_WAY : 1);
     if (now < this.waitUntil) nextIn(this.waitUntil - now);
-    else if (wanted.preview && !wanted.requested && left > 0) {
+    else if (wanted.moves && !wanted.requested && left > 0) {
       if (wanted.drawHere?.(this.canvas)) {
         wanted.requested = "preview";
         this.note(wanted, "preview", "browser");

@@ -61,8 +61,7 @@ export function useScene({ records: first, id, query, pictureOf }) {
     if (!valid && record && !moving) form.current.reportValidity();
     const picture = valid && record ? pictureOf(record, values()) : null;
     if (!picture) return;
-    if (moving) stream.current.move(picture.preview, picture.full, picture.drawHere);
-    else stream.current.set(picture.full);
+    stream.current.show(picture, moving);
     later(picture.keep, KEEP_MS);
   }
 
