@@ -2,7 +2,7 @@
 import { html, useRef } from "../parts/view.js";
 import { ColourBar } from "../viewer/colour_bar.js";
 import { Field } from "../viewer/field.js";
-import { useImageView } from "../viewer/image_view.js";
+import { useImage } from "../viewer/image.js";
 import { robustLimits } from "../viewer/measures.js";
 import { float32Of } from "../viewer/npy.js";
 import { QUANTITIES } from "../viewer/quantities.js";
@@ -36,11 +36,12 @@ export function PreviewPicture({ record, what }) {
   const state = useRef({});
   if (record && record !== state.current.record) state.current = follow(state.current, record);
   const { plane, pictures, low = 0, high = 1 } = state.current;
-  const [canvas] = useImageView(plane, { low, high, map: MAP, ...WHOLE, marks: {} });
+  const [canvas, , marks] = useImage({ plane, low, high, map: MAP, ...WHOLE, marks: {} });
   const label = record ? `Sound speed so far, ${record.range_mps.map(Math.round).join(" to ")} m/s` : "No image yet";
   return html`<figure class="tile">
     <div class=${`preview-stage ${record ? "drawn" : ""}`}>
       <canvas class="preview" ref=${canvas} role="img" aria-label=${label} data-pictures=${pictures}></canvas>
+      ${marks}
       <p class="hint" hidden=${record !== null}>The image appears after the first iteration</p>
     </div>
     <${ColourBar} low=${low} high=${high} map=${MAP} words=${`${WORDS} (${UNIT})`} hidden=${!record} />

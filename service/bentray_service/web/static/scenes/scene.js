@@ -5,7 +5,7 @@ import { request, send } from "../parts/api.js";
 import { DropZone } from "../parts/drop_zone.js";
 import { titleOf } from "../parts/lists.js";
 import { usePointers } from "../parts/pointers.js";
-import { Alert, Button, Facts, Form, html, Options, Section, useAct, useEffect, useLater, useNewest, useRef, useState } from "../parts/view.js";
+import { Alert, Button, Choice, Facts, Form, html, Section, useAct, useEffect, useLater, useNewest, useRef, useState } from "../parts/view.js";
 import { inTime } from "../parts/words.js";
 import { PictureStream, rateOf } from "./picture_stream.js";
 
@@ -138,23 +138,14 @@ function Stage({ id, words, hint, describe, onShown = () => {}, onError, camera,
     <${Facts} id="view-facts">${shown?.facts}</${Facts}>`;
 }
 
-// Stored records to choose from.
-function RecordSelect({ name, path, records, chosen, none }) {
-  const entries = records.length ? records.map((record) => [record.id, `${titleOf(record)} (${inTime(record.created)})`]) : [["", none]];
-  return html`
-    <label for=${name} class="caption">${`${name[0].toUpperCase()}${name.slice(1)} to render`}</label>
-    <select id=${name} disabled=${!records.length} value=${chosen} onChange=${({ target }) => go(`${path}/${target.value}`)}>
-      <${Options} entries=${entries} />
-    </select>`;
-}
-
 // A whole page. scene: of useScene; name: of the kind of record; path: of the page; stage: see Stage; below: the picture; formats, none: of files,
 // and without a record; onStored(record): after an upload; facts: of the record; form: its id; onChange(): of the form; fields: in it; begin:
 // { id, title, job() } of the button that starts a job; actions: beside it; products: what is deleted with a record, null if it is not deleted
 // here; jobs: { title, kind, empty, onJobs } of the jobs below.
 export function ScenePage(props) {
   const { scene, title, name, path, stage, below, formats, none, onStored, facts, form, onChange, fields, begin, products, actions, jobs, children } = props;
-  const { record, act, camera } = scene;
+  const { record, records, act, camera } = scene;
+  const entries = records.length ? records.map((one) => [one.id, `${titleOf(one)} (${inTime(one.created)})`]) : [["", none]];
   const start = () => act(async () => {
     await send("POST", "/v1/jobs", begin.job());
     await scene.refresh.current();
@@ -174,7 +165,8 @@ export function ScenePage(props) {
       <div>
         <${DropZone} name=${name} prompt=${`Choose a ${name}`} formats=${formats} onStored=${onStored}
           metadataOf=${(file) => ({ kind: name, title: file.name.slice(0, 200) })} />
-        <${RecordSelect} name=${name} path=${path} records=${scene.records} chosen=${record?.id} none=${none} />
+        <${Choice} caption=${`${name[0].toUpperCase()}${name.slice(1)} to render`} id=${name} disabled=${!records.length} entries=${entries} chosen=${record?.id}
+          onChange=${({ target }) => go(`${path}/${target.value}`)} />
         <${Facts} id=${`${name}-facts`}>${facts}</${Facts}>
         <${Form} id=${form} ref=${scene.form} onChange=${onChange} onSubmit=${start}>
           ${fields}

@@ -2,7 +2,7 @@
 import { usePointers } from "../parts/pointers.js";
 import { html, useRef } from "../parts/view.js";
 import { AXES } from "./field.js";
-import { useImageView } from "./image_view.js";
+import { useImage } from "./image.js";
 import { inPlane, MEASURES, withDrag, withPoint } from "./measures.js";
 import { clampZoom, WHOLE } from "./state.js";
 
@@ -15,7 +15,7 @@ const [DRAG_SHARE, KEY_SHARE] = [1 / 300, 0.05];
 
 const draws = ({ tool }) => !["pan", "window"].includes(tool);
 
-// What pointers and keys do with the plane across an axis. image: its ImageView; main: the field that the cursor keeps to; window: of the colours.
+// What pointers and keys do with the plane across an axis. image: where it is on its canvas, see image.js; main: the field that the cursor keeps to; window: of the colours.
 function actionsOf({ key, axis }, image, { main, state, window, change, setWindow, setHover }) {
   const { cursor } = state;
   const across = AXES.indexOf(axis);
@@ -26,7 +26,7 @@ function actionsOf({ key, axis }, image, { main, state, window, change, setWindo
   return {
     hover(point) {
       const place = point && image.toPlane(...point);
-      setHover({ at: place && { key, axis, place, other: image.showsOther(place[0]) }, spoken: false });
+      setHover({ at: place && { key, axis, place, other: point[0] > image.border }, spoken: false });
     },
     moveTo(...places) {
       [first, second].forEach((k, n) => (cursor[k] = main.position(AXES[k], main.nearest(AXES[k], places[n]))));
@@ -94,15 +94,14 @@ function actionsOf({ key, axis }, image, { main, state, window, change, setWindo
   };
 }
 
-// image: its plane and look, as for ImageView.show; actions: see actionsOf.
-export function Tile({ tile, words, image: { plane, ...look }, actions }) {
-  const [canvas, view] = useImageView(plane, look);
+// look: as for useImage; actions: see actionsOf.
+export function Tile({ tile, words, look, actions }) {
+  const [canvas, image, marks] = useImage(look);
   const pressed = useRef(null);
   const { state } = actions;
-  const act = () => actionsOf(tile, view.current, actions);
+  const act = () => actionsOf(tile, image, actions);
   const pointers = usePointers({
     press(point) {
-      const { current: image } = view;
       pressed.current = point && { point, moved: false, at: image.toPlane(...point), centre: image.centre, window: actions.window };
     },
     hover: (point) => act().hover(point),
@@ -134,7 +133,8 @@ export function Tile({ tile, words, image: { plane, ...look }, actions }) {
   const label = `Image of ${words}${tile.title && `, ${tile.title}`}; arrow keys move the cursor`;
   return html`<figure class="tile">
     <canvas ref=${canvas} class=${grip ? "plane grip" : "plane"} tabindex="0" role="application" aria-roledescription="image" aria-label=${label}
-      onKeyDown=${onKeyDown} onWheel=${onWheel} ...${pointers}></canvas>
+      ...${image && { onKeyDown, onWheel, ...pointers }}></canvas>
+    ${marks}
     ${tile.title && html`<figcaption>${tile.title}</figcaption>`}
   </figure>`;
 }

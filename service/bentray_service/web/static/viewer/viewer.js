@@ -142,7 +142,7 @@ function Body({ read, panes, state, change }) {
     });
   }
 
-  function imageOf(tile) {
+  function lookOf(tile) {
     const { axis } = tile;
     const linked = hover && hover.key !== tile.key && hover.axis === axis ? hover.place : null;
     const marks = {
@@ -171,7 +171,7 @@ function Body({ read, panes, state, change }) {
   return html`<div class="viewer-body">
     <div class="viewer-images">
       <div class="tiles" data-count=${tiles.length}>
-        ${tiles.map((tile) => html`<${Tile} key=${tile.key} tile=${tile} words=${quantity.words} image=${imageOf(tile)} actions=${actions} />`)}
+        ${tiles.map((tile) => html`<${Tile} key=${tile.key} tile=${tile} words=${quantity.words} look=${lookOf(tile)} actions=${actions} />`)}
       </div>
       ${state.mode === "swipe" && panes.length > 1 && html`<${Swipe} panes=${panes} other=${state.other} swipe=${state.swipe} change=${change} />`}
       <${Slices} main=${main} axes=${axes} axis=${main.axes.length > 1 && !state.planes ? state.axis : null} cursor=${cursor}
