@@ -16,6 +16,7 @@ from bentray_kernels.task_graph import Cancelled
 from bentray_kernels.tomography.reconstruction_graph import ReconstructionCheckpoint
 from bentray_kernels.tomography.result import Iteration, Progress
 from bentray_kernels.tomography.sart import sart_step
+from bentray_service.jobs import kinds
 from bentray_workers.cluster.checkpoints import Checkpoints
 from bentray_workers.reconstruction import reconstruction_run
 
@@ -68,6 +69,22 @@ def in_turns(
 
     monkeypatch.setattr(reconstruction_run, "reconstruct", reconstruct)
     return waiting
+
+
+def simulating(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """Let each simulation make a scan of the name "A phantom" at once; the requests for them."""
+    requests: list[Any] = []
+    made = {"title": "A phantom", "source": "", "license": "", "dimension": 2, "elements": 16, "ntx": 16}
+    made |= {"nrx": 16, "slices": 1, "has_traces": False, "has_travel_times": True, "has_truth": True}
+    made |= {"water_speed_mps": 1500.0, "bytes": 1, "sha256": "0" * 64}
+
+    def simulate_scan(client: Any, request: Any, target: Path, work_dir: Path, **control: Any) -> Any:
+        requests.append(request)
+        target.write_bytes(b"scan")
+        return made
+
+    monkeypatch.setattr(kinds, "simulate_to_file", simulate_scan)
+    return requests
 
 
 def uploaded(address: str, file: Path) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from playwright.sync_api import expect
 from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_service.jobs import kinds
 
-from .live_results import started, stored_volume
+from .live_results import simulating, started, stored_volume
 
 pytestmark = pytest.mark.browser
 
@@ -58,15 +58,7 @@ def test_a_turntable_is_shown_and_plays_when_asked(page, address, work, monkeypa
 
 
 def test_simulated_scan_can_be_reconstructed(page, serve, monkeypatch):
-    made = {"title": "A phantom", "source": "", "license": "", "dimension": 2, "elements": 16, "ntx": 16}
-    made |= {"nrx": 16, "slices": 1, "has_traces": False, "has_travel_times": True, "has_truth": True}
-    made |= {"water_speed_mps": 1500.0, "bytes": 1, "sha256": "0" * 64}
-
-    def simulate_scan(client, request, target, work_dir, **control):
-        target.write_bytes(b"scan")
-        return made
-
-    monkeypatch.setattr(kinds, "simulate_to_file", simulate_scan)
+    simulating(monkeypatch)
     url = serve()
     asked = {"kind": "simulation", "settings": {"nodes": 16, "elements": 16}}
     job = httpx.post(f"{url}/v1/jobs", json=asked).json()

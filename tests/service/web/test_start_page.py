@@ -5,12 +5,11 @@ import pytest
 from playwright.sync_api import expect
 from scipy.io import savemat
 
-from bentray_service.jobs import kinds
 from bentray_workers.simulation.request import SAMPLE, PhantomScan
 
 from ...workers.foreign_scans.scans import delta_tof, positions
 from .conftest import drop
-from .live_results import uploaded
+from .live_results import simulating, uploaded
 
 pytestmark = pytest.mark.browser
 
@@ -83,17 +82,7 @@ def test_own_variables_are_named_in_a_form_that_opens_when_a_file_is_rejected(pa
 
 @pytest.mark.nightly
 def test_a_sample_scan_is_simulated_and_opened(page, address, monkeypatch):
-    requests = []
-    made = {"title": "A phantom", "source": "", "license": "", "dimension": 2, "elements": 64, "ntx": 32}
-    made |= {"nrx": 64, "slices": 1, "has_traces": True, "has_travel_times": False, "has_truth": True}
-    made |= {"water_speed_mps": 1500.0, "bytes": 1, "sha256": "0" * 64}
-
-    def simulate_scan(client, request, target, work_dir, **control):
-        requests.append(request)
-        target.write_bytes(b"scan")
-        return made
-
-    monkeypatch.setattr(kinds, "simulate_to_file", simulate_scan)
+    requests = simulating(monkeypatch)
     page.goto(address)
     page.get_by_role("button", name="Simulate a sample scan").click()
     page.get_by_role("heading", name="A phantom").wait_for()
