@@ -3,15 +3,14 @@
   const STORED = "bentray-theme";
   const system = matchMedia("(prefers-color-scheme: dark)");
   const root = document.documentElement;
-
-  const chosen = () => localStorage.getItem(STORED) || (system.matches ? "dark" : "light");
+  const other = () => (root.dataset.theme === "dark" ? "light" : "dark");
 
   const show = () => {
-    root.dataset.theme = chosen();
+    root.dataset.theme = localStorage.getItem(STORED) || (system.matches ? "dark" : "light");
     const button = document.getElementById("theme");
-    if (button) button.textContent = chosen() === "dark" ? "Light" : "Dark";
-    if (button) button.setAttribute("aria-label", `Switch to ${chosen() === "dark" ? "light" : "dark"} colours`);
-    document.dispatchEvent(new Event("theme"));
+    if (!button) return;
+    button.textContent = other() === "dark" ? "Dark" : "Light";
+    button.setAttribute("aria-label", `Switch to ${other()} colours`);
   };
 
   show();
@@ -19,10 +18,9 @@
   document.addEventListener("DOMContentLoaded", () => {
     show();
     document.getElementById("theme")?.addEventListener("click", () => {
-      const other = chosen() === "dark" ? "light" : "dark";
       // The choice of the system is not stored: the page follows it again.
-      if ((other === "dark") === system.matches) localStorage.removeItem(STORED);
-      else localStorage.setItem(STORED, other);
+      if ((other() === "dark") === system.matches) localStorage.removeItem(STORED);
+      else localStorage.setItem(STORED, other());
       show();
     });
   });

@@ -8,11 +8,6 @@ const MISSING = 0xffe4e4e4;
 const BAR_SHARE = 0.3;
 const FILL = 0.97;
 
-// Opacity of a node: 1 where it is known, 0 where two standard deviations reach half the range of the colours.
-function opacity(deviation, low, high) {
-  return Math.min(1, Math.max(0, 1 - (4 * deviation) / (high - low)));
-}
-
 // A canvas with a pixel for each node. deviations: a plane of the same nodes that fades what is not known, or null.
 function coloured(plane, low, high, map, deviations) {
   const { na, nb, values } = plane;
@@ -26,7 +21,8 @@ function coloured(plane, low, high, map, deviations) {
       const step = Math.floor((value - low) * scale);
       const place = (nb - 1 - b) * na + a;
       pixels[place] = Number.isFinite(value) ? colours[Math.min(255, Math.max(0, step))] : MISSING;
-      if (deviations) image.data[4 * place + 3] = Math.round(255 * opacity(deviations.values[a * nb + b], low, high));
+      // Opaque where it is known, clear where two standard deviations reach half the range of the colours.
+      if (deviations) image.data[4 * place + 3] = 255 * (1 - (4 * deviations.values[a * nb + b]) / (high - low));
     }
   }
   const bitmap = Object.assign(document.createElement("canvas"), { width: na, height: nb });
