@@ -10,8 +10,6 @@ const POLLS = [40, 300];
 
 const NOUNS = { dataset: "a scan", volume: "a volume", mesh: "a mesh" };
 
-const wait = (milliseconds) => new Promise((resolve) => setTimeout(resolve, milliseconds));
-
 // Whether a failure passes: no answer, another offset, an upload that is locked by a lost connection, a busy service.
 const passes = (status) => !status || [409, 423, 429].includes(status) || status >= 500;
 const statusOf = (error) => error.originalResponse?.getStatus();
@@ -86,7 +84,7 @@ async function ingested(address) {
       failures += 1;
       if (failures > 100) throw error;
     }
-    await wait(pause);
+    await new Promise((resolve) => setTimeout(resolve, pause));
     pause = Math.min(2 * pause, POLLS[1]);
   }
 }

@@ -3,15 +3,13 @@ import { description } from "./api.js";
 import { changedIn, focusOn, SettingField, settingOf, valueIn, wordsOf } from "./settings_fields.js";
 import { Facts, Field, html, useEffect, useMemo, useReducer, useRef, useState } from "./view.js";
 
-const REFERENCE = "#/components/schemas/";
-
 // Groups of settings that are described as a schema: [schema, settings]; the first one, without a schema, has those of no group.
-export async function readSettings(name = "Settings") {
+export async function readSettings() {
   const { components: { schemas } } = await description();
-  const entries = Object.entries(schemas[name].properties);
+  const entries = Object.entries(schemas.Settings.properties);
   const own = entries.filter(([, schema]) => !schema.$ref).map(([leaf, schema]) => settingOf([leaf], schema));
   const groups = entries.filter(([, schema]) => schema.$ref).map(([group, schema]) => {
-    const { properties } = schemas[schema.$ref.slice(REFERENCE.length)];
+    const { properties } = schemas[schema.$ref.split("/").at(-1)];
     return [schema, Object.entries(properties).map(([leaf, inner]) => settingOf([group, leaf], inner))];
   });
   return [[null, own], ...groups];

@@ -13,11 +13,6 @@ const SAVE_MS = 250;
 
 const fades = (panes, quantity) => panes.length === 1 && panes[0].stored.includes("uncertainty") && FADED.includes(quantity);
 
-// The names of the quantities that all panes have.
-function commonOf(panes) {
-  return shownOf(panes.map((pane) => pane.stored).reduce((all, stored) => all.filter((name) => stored.includes(name))));
-}
-
 // What is shown of which pane: { number, axis, title, minus, other }; minus: the first pane is subtracted; other: the number of the right image.
 function layoutOf(panes, { planes, axis, mode, other }, axes) {
   if (panes.length === 1) return (planes ? axes : [axis]).map((across) => ({ number: 0, axis: across, title: planes ? `across ${across}` : "" }));
@@ -194,7 +189,8 @@ function Body({ read, panes, state, change }) {
 // panes: [{ title, values, stored, detail }], with Values, the names of the stored quantities, and the resolution width, mm, if it is known. state: of the view, which is changed in place;
 // keep(query): called when the view changes.
 export function Viewer({ panes, state, keep, ...more }) {
-  const names = useMemo(() => commonOf(panes), []);
+  // The quantities that all panes have.
+  const names = shownOf(panes[0].stored.filter((name) => panes.every(({ stored }) => stored.includes(name))));
   if (!names.includes(state.quantity)) [state.quantity] = names;
   state.other = Math.max(1, Math.min(state.other, panes.length - 1));
   const [, redraw] = useReducer((count) => count + 1, 0);
