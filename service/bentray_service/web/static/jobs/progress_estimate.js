@@ -5,16 +5,11 @@ const WINDOW_S = 20;
 const FULL = 0.995;
 
 export class ProgressEstimate {
-  constructor() {
-    this.phase = null;
-    this.reports = [];
-    this.begin();
-  }
-
+  phase = null;
+  reports = [];
   // Of a phase: the share that is shown, and the tasks it stands for; null before the first report is shown.
-  begin() {
-    [this.shown, this.tasks] = [0, null];
-  }
+  shown = 0;
+  tasks = null;
 
   // A report at a time, s: { done, total, phase }, and the running time of the job, s. The total may fall, where
   // tasks turn out not to be needed, and grow.
@@ -22,8 +17,7 @@ export class ProgressEstimate {
     if (phase !== this.phase || done < (this.reports.at(-1)?.done ?? 0)) {
       // What was done before the page was opened took as long as the job has run, if there was no phase before.
       const begun = this.phase === null && done ? [{ time: now - seconds, done: 0 }] : [];
-      [this.phase, this.reports] = [phase, begun];
-      this.begin();
+      Object.assign(this, { phase, reports: begun, shown: 0, tasks: null });
     }
     this.total = total;
     if (this.reports.at(-1)?.done === done) return;
@@ -33,9 +27,8 @@ export class ProgressEstimate {
 
   // Tasks per second; null before two reports.
   rate() {
-    if (this.reports.length < 2) return null;
     const [first, last] = [this.reports[0], this.reports.at(-1)];
-    return last.time > first.time ? (last.done - first.done) / (last.time - first.time) : null;
+    return last?.time > first?.time ? (last.done - first.done) / (last.time - first.time) : null;
   }
 
   // Tasks done at a time: after the last report it moves on at the rate so far, by one step at most.
