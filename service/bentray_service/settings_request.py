@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import fields, is_dataclass
 from difflib import get_close_matches
 from typing import Any, TypeVar
@@ -20,6 +20,7 @@ Record = TypeVar("Record")
 RECORDS = {Settings, *(type(field.default) for field in fields(Settings) if is_dataclass(field.default))}
 # Description of the settings of a request.
 DEFAULTS = "Omitted settings take their defaults."
+# Each kind of record is analysed once.
 _ADAPTERS: dict[type, TypeAdapter[Any]] = {}
 
 
@@ -88,20 +89,18 @@ def nested(values: Mapping[str, Any]) -> dict[str, Any]:
     return settings
 
 
-def settings_of(values: Mapping[str, Any]) -> Settings:
-    """The settings of a nested record of numbers and words as JSON has them; the rest takes its default.
+def record_of(kind: type[Record], values: Mapping[str, Any]) -> Record:
+    """A dataclass of settings from numbers and words as JSON has them; the rest takes its default.
 
     Raises:
         InvalidInput: naming the first setting that is unknown, wrong, or without effect beside the others,
             its value and what is accepted.
     """
-    return record_of(Settings, values)
-
-
-def record_of(kind: type[Record], values: Mapping[str, Any]) -> Record:
-    """Read any dataclass of settings, by the rules of ``settings_of``."""
+    if kind not in _ADAPTERS:
+        _ADAPTERS[kind] = TypeAdapter(kind)
     try:
-        record: Record = check_used(_adapter(kind)(check_setting_names(dict(values), kind)))
+        named = check_setting_names(dict(values), kind)
+        record: Record = check_used(_ADAPTERS[kind].validate_python(named))
     except ValidationError as error:
         # Loads FastAPI, which nothing else here needs.
         from .web.errors import fault_of
@@ -114,11 +113,3 @@ def record_of(kind: type[Record], values: Mapping[str, Any]) -> Record:
 def plain_numbers(values: Mapping[str, Any]) -> dict[str, Any]:
     """Values with Python's numbers in place of those of NumPy, which JSON does not know."""
     return {name: value.item() if isinstance(value, np.generic) else value for name, value in values.items()}
-
-
-def _adapter(kind: type[Record]) -> Callable[[Any], Record]:
-    """Makes a record of plain values; each kind is analysed once."""
-    if kind not in _ADAPTERS:
-        _ADAPTERS[kind] = TypeAdapter(kind)
-    validate: Callable[[Any], Record] = _ADAPTERS[kind].validate_python
-    return validate

@@ -103,9 +103,9 @@ class Quota:
         """
         with self._database.write() as connection:
             usage.drop_leased(connection) if alone else usage.drop_expired(connection)
-        for tenant, sizes in files.sizes():
+        for folder in files.all():
             with self._database.write() as connection:
-                usage.correct(connection, tenant, sizes)
+                usage.correct(connection, Tenant(folder.root.name), folder.sizes())
 
     def renew(self) -> None:
         """Renew the reservations of this process, and drop those of dead processes."""

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..errors import Damaged, DatabaseFull, DatabaseUnavailable, Deleted
-from ..rows.checksums import Checksums, Digest
+from ..rows.checksums import Checksums
 from ..rows.ids import Tenant
 from ..rows.tables import ChecksumRow
 from .data_folder import Files
@@ -47,7 +47,7 @@ class CheckedStore(Store):
         self._comparing: dict[Path, threading.Lock] = {}
 
     def publish(self, path: Path) -> None:
-        tenant, name, place = self._named(path)
+        tenant, name, place = _named(path)
         # Before publication, since it may be read immediately afterwards.
         self._checksums.record(tenant, name, place, digest_of(path), as_written=True)
         self._inner.publish(path)
@@ -62,7 +62,7 @@ class CheckedStore(Store):
         if path.parent.name not in KEPT:
             # Not a stored item, e.g. the work folder of a job.
             return self._inner.fetch(path)
-        tenant, name, place = self._named(path)
+        tenant, name, place = _named(path)
         row = self._checksums.get(tenant, name)
         try:
             self._inner.fetch(path)
@@ -84,7 +84,7 @@ class CheckedStore(Store):
 
     def remove(self, paths: Collection[Path]) -> None:
         # Checksums first, so that readers recognise a missing file as deleted.
-        for tenant, named in groupby(sorted(map(self._named, paths)), key=itemgetter(0)):
+        for tenant, named in groupby(sorted(map(_named, paths)), key=itemgetter(0)):
             self._checksums.delete(tenant, [name for _, name, _ in named])
         self._inner.remove(paths)
         for path in paths:
@@ -105,7 +105,7 @@ class CheckedStore(Store):
             known = row.sha256, stamp_of(path)
             if self._compared.get(path) == known:
                 return True
-            if digest_of(path) != _of(row):
+            if digest_of(path) != (row.bytes, row.sha256):
                 return False
             self._compared[path] = known
             return True
@@ -156,13 +156,10 @@ class CheckedStore(Store):
         finally:
             self._comparing.pop(path, None)
 
-    def _named(self, path: Path) -> tuple[Tenant, str, str]:
-        """Tenant, id and path below the folder of the tenant."""
-        return *owner_of(path), f"{path.parent.name}/{path.name}"
 
-
-def _of(row: ChecksumRow) -> Digest:
-    return Digest(row.bytes, row.sha256)
+def _named(path: Path) -> tuple[Tenant, str, str]:
+    """Tenant, id and path below the folder of the tenant."""
+    return *owner_of(path), f"{path.parent.name}/{path.name}"
 
 
 class Finding(NamedTuple):
@@ -190,8 +187,8 @@ def scrub(files: Files, checksums: Checksums, orphans: Orphans) -> Iterator[Find
     """
     assert isinstance(files.store, CheckedStore)
     rows = {(row.tenant, row.path) for row in checksums.all()}
-    unknown = {_place(path) for path in orphans.found()}
-    lying = {_place(path) for path in stored_files(files.root, KEPT)}
+    unknown = {_named(path)[::2] for path in orphans.found()}
+    lying = {_named(path)[::2] for path in stored_files(files.root, KEPT)}
     for tenant, place in sorted(rows | lying | unknown):
         if (tenant, place) in unknown:
             yield Finding(tenant, place, "orphan")
@@ -205,7 +202,3 @@ def scrub(files: Files, checksums: Checksums, orphans: Orphans) -> Iterator[Find
             continue
         else:
             yield Finding(tenant, place, "sound" if (tenant, place) in rows else "first seen")
-
-
-def _place(path: Path) -> tuple[Tenant, str]:
-    return owner_of(path)[0], f"{path.parent.name}/{path.name}"

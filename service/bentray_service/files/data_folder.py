@@ -7,7 +7,7 @@ import json
 import logging
 import re
 import secrets
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, NamedTuple
 
@@ -91,22 +91,13 @@ class Files:
 
     def drop_leftovers(self) -> None:
         """Delete incomplete files of a dead process; the folder must be locked."""
-        for files in self._all():
+        for files in self.all():
             files.drop_leftovers()
         for left in self.scratch.iterdir():
             remove_path(left)
 
-    def keep_work(self, job_ids: Collection[str]) -> None:
-        """Delete the work folders of all other jobs."""
-        for files in self._all():
-            files.keep_work(job_ids)
-
-    def sizes(self) -> Iterator[tuple[Tenant, dict[str, int]]]:
-        """Sizes of stored items of each tenant in this folder, bytes by id; see ``TenantFiles.sizes``."""
-        for files in self._all():
-            yield Tenant(files.root.name), files.sizes()
-
-    def _all(self) -> Iterator[TenantFiles]:
+    def all(self) -> Iterator[TenantFiles]:
+        """The folders of all tenants."""
         for folder in self._tenants.iterdir():
             yield self.of(Tenant(folder.name))
 

@@ -68,12 +68,13 @@ def reconstruct(
     """
     from bentray_kernels.requests.ranges import Range
     from bentray_kernels.tomography.requirements import check_scan
+    from bentray_kernels.tomography.settings import Settings
     from bentray_workers.compilation.cache_misses import announce
     from bentray_workers.reconstruction.reconstruction_run import reconstruct as run
 
-    from ..settings_request import nested, plain_numbers, settings_of
+    from ..settings_request import nested, plain_numbers, record_of
 
-    chosen = settings_of(nested(plain_numbers({"method": method, **settings})))
+    chosen = record_of(Settings, nested(plain_numbers({"method": method, **settings})))
     if threads is not None:
         Range(1, MOST_THREADS).check("threads", threads)
     source = scan if isinstance(scan, Scan) else read(scan)

@@ -6,7 +6,7 @@ import asyncio
 import logging
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from itertools import chain
 from typing import TypeVar
 
@@ -140,25 +140,21 @@ class EventFeed:
         self._polling: asyncio.Task[None] | None = None
         self._asked = asyncio.Event()
 
-    @contextmanager
-    def watch(self, tenant: Tenant, job_id: str) -> Iterator[WatchedJob]:
+    def watch(self, tenant: Tenant, job_id: str) -> AbstractContextManager[WatchedJob]:
         """Watch a job in a ``with`` block; the caller has checked the owner.
 
         Raises:
             TooManyStreams: when too many streams are open, of the tenant or in total.
         """
-        with self._stream(tenant, self._watched, job_id, WatchedJob, f"/v1/jobs/{job_id}") as watched:
-            yield watched
+        return self._stream(tenant, self._watched, job_id, WatchedJob, f"/v1/jobs/{job_id}")
 
-    @contextmanager
-    def watch_tenant(self, tenant: Tenant) -> Iterator[WatchedTenant]:
+    def watch_tenant(self, tenant: Tenant) -> AbstractContextManager[WatchedTenant]:
         """Watch all jobs of a tenant in a ``with`` block.
 
         Raises:
             TooManyStreams: as ``watch``.
         """
-        with self._stream(tenant, self._tenants, tenant, WatchedTenant, "/v1/jobs") as watched:
-            yield watched
+        return self._stream(tenant, self._tenants, tenant, WatchedTenant, "/v1/jobs")
 
     @contextmanager
     def _stream(

@@ -141,7 +141,9 @@ class Runner(BackgroundThread):
     def start(self) -> None:
         """Take over jobs of a dead service, then start the threads."""
         self._recover()
-        self._files.keep_work(self.queue.unfinished())
+        unfinished = self.queue.unfinished()
+        for files in self._files.all():
+            files.keep_work(unfinished)
         super().start()
         self._leases.start()
 
@@ -215,7 +217,8 @@ class Runner(BackgroundThread):
 
     def _run_to_end(self, job: JobRow) -> None:
         try:
-            self._run(job)
+            with about(job=job.id), self._traces.attempt(job):
+                self._run(job)
         except Exception:
             # The lease expires, and the job is claimed again.
             log.exception("the outcome of %s could not be stored", job.id)
@@ -227,10 +230,6 @@ class Runner(BackgroundThread):
         return shutil.disk_usage(self._files.root).free >= self._min_free_bytes
 
     def _run(self, job: JobRow) -> None:
-        with about(job=job.id), self._traces.attempt(job):
-            self._run_logged(job)
-
-    def _run_logged(self, job: JobRow) -> None:
         job_id, files = job.id, self._files.of(job.tenant)
         reporter = Reporter(
             self.queue, job_id, self._leaving.is_set, taken=lambda: bytes_in(files.work(job_id))

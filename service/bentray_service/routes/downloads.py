@@ -56,7 +56,7 @@ def download(
     with ExitStack() as stack:
         stack.enter_context(file)
         state = os.fstat(file.fileno())
-        tag = tag or _tag_of(state, path, seed)
+        tag = tag or tag_of(path, seed, state)
         if (response := unchanged(request, tag)) is not None:
             return response
         whole = not _wants_range(request, tag, state.st_size)
@@ -66,9 +66,11 @@ def download(
         return response
 
 
-def tag_of(path: Path, seed: str) -> str:
+def tag_of(path: Path, seed: str, state: os.stat_result | None = None) -> str:
     """The ETag of a file, or of a file generated from it; arguments and errors as of ``download``."""
-    return _tag_of(file_status(path), path, seed)
+    state = state or file_status(path)
+    identity = f"{seed}/{path.name}/{state.st_mtime_ns}/{state.st_size}"
+    return f'"{hashlib.sha256(identity.encode()).hexdigest()[:32]}"'
 
 
 def file_status(path: Path) -> os.stat_result:
@@ -98,11 +100,6 @@ def without_length(media_type: str, headers: dict[str, str]) -> Response:
 def headers_of(tag: str) -> dict[str, str]:
     """Cache headers of a file."""
     return {"ETag": tag, "Cache-Control": "private, no-cache"}
-
-
-def _tag_of(state: os.stat_result, path: Path, seed: str) -> str:
-    identity = f"{seed}/{path.name}/{state.st_mtime_ns}/{state.st_size}"
-    return f'"{hashlib.sha256(identity.encode()).hexdigest()[:32]}"'
 
 
 class OpenFile(FileResponse):

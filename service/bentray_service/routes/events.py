@@ -119,7 +119,7 @@ async def _of_job(feed: EventFeed, job: WatchedJob, last: int) -> AsyncIterator[
                 at = datetime.fromtimestamp(event.time, UTC).isoformat()
                 messages.append(_event("state", {"state": event.state, "note": event.note, "time": at}, last))
         row = job.row or JobProgress("", "", 0, 0, "")
-        progress = {"done": row.done, "total": row.total, "phase": row.phase or ""}
+        progress = _progress_of(row)["progress"]
         if row.state == "running" and row.total and progress != sent:
             messages.append(_event("progress", progress))
             sent = progress

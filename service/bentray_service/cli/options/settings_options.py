@@ -47,6 +47,6 @@ def settings_from(options: dict[str, Any]) -> Settings:
     Raises:
         InvalidInput: naming the setting, its value and what is accepted.
     """
-    from ...settings_request import nested, settings_of
+    from ...settings_request import nested, record_of
 
-    return settings_of(nested(options))
+    return record_of(Settings, nested(options))
