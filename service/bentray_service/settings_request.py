@@ -8,7 +8,7 @@ from difflib import get_close_matches
 from typing import Any, TypeVar
 
 import numpy as np
-from pydantic import TypeAdapter, ValidationError
+from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError, field_validator
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.requests.request_fields import check_used
@@ -46,6 +46,25 @@ def check_setting_names(settings: Any, kind: type[Any] = Settings, place: str = 
         if inner:
             check_setting_names(value, type(known[name]), f"{place}{name}.")
     return settings
+
+
+class SettingsRequest(BaseModel):
+    """A request with ``settings``, a dataclass."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    @field_validator("settings", mode="before", check_fields=False)
+    @classmethod
+    def check_names(cls, settings: Any) -> Any:
+        """Reject unknown settings by name, with the accepted ones."""
+        kind: Any = cls.model_fields["settings"].annotation
+        return check_setting_names(settings, kind)
+
+    @field_validator("settings", mode="after", check_fields=False)
+    @classmethod
+    def check_effect(cls, settings: Any) -> Any:
+        """Reject settings that have no effect beside the others, by name."""
+        return check_used(settings)
 
 
 def _replacement(name: str) -> str:

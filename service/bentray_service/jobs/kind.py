@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar
 
 from fastapi.openapi.models import Example
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, field_validator
+from pydantic import Field, TypeAdapter
 
-from bentray_kernels.requests.request_fields import check_used
 from bentray_workers.cluster.task_pool import JobControl
 
 from ..compute import Compute
@@ -21,13 +20,11 @@ from ..rows.ids import Tenant
 from ..rows.jobs import NewJob
 from ..rows.stored_tables import Datasets, Meshes, Volumes
 from ..rows.tables import JobRow, Plain, ResultRow
-from ..settings_request import check_setting_names
+from ..settings_request import SettingsRequest
 
 
-class JobRequest(BaseModel):
+class JobRequest(SettingsRequest):
     """The body of a request for a job; each kind has its own subclass."""
-
-    model_config = ConfigDict(extra="forbid")
 
     kind: str
     webhook: str | None = Field(
@@ -35,19 +32,6 @@ class JobRequest(BaseModel):
         max_length=2000,
         description="https address to which a signed message is sent when the job ends.",
     )
-
-    @field_validator("settings", mode="before", check_fields=False)
-    @classmethod
-    def check_names(cls, settings: Any) -> Any:
-        """Reject unknown settings by name, with the accepted ones."""
-        kind: Any = cls.model_fields["settings"].annotation
-        return check_setting_names(settings, kind)
-
-    @field_validator("settings", mode="after", check_fields=False)
-    @classmethod
-    def check_effect(cls, settings: Any) -> Any:
-        """Reject settings that have no effect beside the others, by name."""
-        return check_used(settings)
 
 
 R = TypeVar("R", bound=JobRequest)

@@ -5,23 +5,20 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Annotated, Any, ClassVar
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import BaseModel, Field
 
-from bentray_kernels.requests.request_fields import check_used
 from bentray_kernels.tomography.settings import Settings
 
 from ...html_tables import ShownRecord
-from ...settings_request import DEFAULTS, check_setting_names
+from ...settings_request import DEFAULTS, SettingsRequest
 from .job_records import State
 
 # Scans of one batch.
 MOST = 1000
 
 
-class BatchRequest(BaseModel):
+class BatchRequest(SettingsRequest):
     """Reconstruct many datasets with the same settings."""
-
-    model_config = ConfigDict(extra="forbid")
 
     datasets: Annotated[list[str], Field(min_length=1, max_length=MOST)] = Field(
         description="Ids of datasets, each once."
@@ -33,19 +30,6 @@ class BatchRequest(BaseModel):
         max_length=2000,
         description="https address to which a signed message is sent when each job ends.",
     )
-
-    @field_validator("settings", mode="before")
-    @classmethod
-    def check_names(cls, settings: Any) -> Any:
-        """Reject unknown settings by name, with the accepted ones."""
-        return check_setting_names(settings, Settings)
-
-    @field_validator("settings", mode="after")
-    @classmethod
-    def check_effect(cls, settings: Settings) -> Settings:
-        """Reject settings that have no effect beside the others, by name."""
-        checked: Settings = check_used(settings)
-        return checked
 
 
 class BatchJobRecord(ShownRecord):
