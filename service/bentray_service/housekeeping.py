@@ -64,11 +64,16 @@ class Housekeeper(BackgroundThread):
         clocks: s since 1970, and monotonic seconds.
         """
         super().__init__("housekeeping")
-        self._settings, self._uploads, self._files = settings, Uploads(database), files
-        self._deletion, self._quota, self._hold = Deletion(database, files), quota, hold
+        self._settings = settings
+        self._uploads = Uploads(database)
+        self._files = files
+        self._deletion = Deletion(database, files)
+        self._quota = quota
+        self._hold = hold
         self._ages = ExpiryMarks(database)
         self._observed = ObservedTime(database, lambda: clocks()[1])
-        self._orphans, self._audit = orphans, audit
+        self._orphans = orphans
+        self._audit = audit
         self._upload_wait_s = min(settings.upload_keep_s, AGE_SECONDS)
         self._clocks = clocks
         self._last: tuple[float, float] | None = None

@@ -38,8 +38,11 @@ class StoreParts(Sources):
 
     def __init__(self, database: Database, files: Files, quota: Quota) -> None:
         super().__init__(database, files)
-        self.database, self.quota, self.deletion = database, quota, Deletion(database, files)
-        self.geometry_fields, self.jobs = GeometryFields(database), Jobs(database)
+        self.database = database
+        self.quota = quota
+        self.deletion = Deletion(database, files)
+        self.geometry_fields = GeometryFields(database)
+        self.jobs = Jobs(database)
         self.batches = Batches(database)
 
 

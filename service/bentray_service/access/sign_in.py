@@ -64,7 +64,8 @@ class SignIn:
         """Raises:
         InvalidInput: if the service would be open to other machines, or for an invalid setting.
         """
-        self._keys, sessions, self.projects = Keys(database), Sessions(database), Projects(database)
+        self._keys, sessions = Keys(database), Sessions(database)
+        self.projects = Projects(database)
         self.watch = KeyWatch(self._keys, sessions, self.projects)
         self._accounts, self._claimed = accounts, ClaimedTenants(database)
         self._trusted = networks(settings.trusted_proxies or "")

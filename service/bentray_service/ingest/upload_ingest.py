@@ -142,7 +142,9 @@ class UploadIngest(BackgroundThread):
         self.limits = IngestLimits(settings.ingest_memory_bytes, settings.ingest_seconds, files.scratch)
         kinds: tuple[type[UploadedTable[Any]], ...] = (Datasets, UploadedVolumes, Meshes)
         self._stores = {kind.what: kind(database) for kind in kinds}
-        self._files, self._accounts, self._quota = files, accounts, quota
+        self._files = files
+        self._accounts = accounts
+        self._quota = quota
         self._keep_s = settings.upload_keep_s
         self._lock = threading.Lock()
         # Called with each new row.

@@ -42,7 +42,9 @@ class Sources:
 
     def __init__(self, database: Database, files: Files) -> None:
         self.files = files
-        self.datasets, self.volumes, self.meshes = Datasets(database), Volumes(database), Meshes(database)
+        self.datasets = Datasets(database)
+        self.volumes = Volumes(database)
+        self.meshes = Meshes(database)
 
 
 @dataclass(frozen=True)
