@@ -170,15 +170,6 @@ class Jobs(NamedTable[JobRow]):
         with self._database.read() as session:
             return [(plan or {}, took or 0.0) for plan, took in session.execute(query)]
 
-    def events(self, tenant: Tenant, job_id: str, after: int = 0) -> list[EventRow]:
-        """The events of one job of this tenant after event ``after``, oldest first."""
-        query = (
-            select(EventRow)
-            .join(JobRow, JobRow.id == EventRow.job_id)
-            .where(JobRow.tenant == tenant, EventRow.job_id == job_id, EventRow.number > after)
-        )
-        return self._database.rows(query.order_by(EventRow.number))
-
     def updates(self, known: Mapping[str, int]) -> tuple[dict[str, JobProgress], dict[str, list[EventRow]]]:
         """The progress of jobs, and their new events, of all tenants.
 

@@ -210,7 +210,7 @@ def test_a_full_disk_is_waited_for(start, uploaded, submitted, until, work, monk
     work.error, room[0] = None, True
     runner.notify()
     assert until(http, job["id"])["state"] == "succeeded"
-    notes = [event.note for event in http.app.state.stores.jobs.events(LOCAL, job["id"])]
+    notes = [event.note for event in http.app.state.stores.jobs.updates({job["id"]: 0})[1][job["id"]]]
     assert notes[2] == "the disk is full; the job continues once there is space"
 
 
@@ -223,7 +223,7 @@ def test_lost_scheduler_fails_no_job(start, running, until, work, error):
     until(http, job["id"], "queued")
     work.error = None
     assert until(http, job["id"])["state"] == "succeeded"
-    notes = {event.note for event in http.app.state.stores.jobs.events(LOCAL, job["id"])}
+    notes = {event.note for event in http.app.state.stores.jobs.updates({job["id"]: 0})[1][job["id"]]}
     assert "no answer from the workers; the job continues when available" in notes
 
 

@@ -52,7 +52,11 @@ def test_success_comes_with_its_volume(database, jobs, queue, dataset):
     assert (row.state, row.done, row.history[0]["emitters"]) == ("succeeded", 4, 4)
     assert row.finished >= row.started
     assert Volumes(database).get(LOCAL, volume_of(job.id)).dataset_id == dataset
-    assert [event.state for event in jobs.events(LOCAL, job.id)] == ["queued", "running", "succeeded"]
+    assert [event.state for event in jobs.updates({job.id: 0})[1][job.id]] == [
+        "queued",
+        "running",
+        "succeeded",
+    ]
 
 
 def test_a_cancelled_job_cannot_succeed(database, jobs, queue, dataset):
@@ -71,7 +75,7 @@ def test_failure_keeps_the_reason(jobs, queue, dataset):
     queue.claim()
     queue.fail(job.id, PROBLEM)
     assert jobs.get(LOCAL, job.id).error == PROBLEM
-    assert jobs.events(LOCAL, job.id)[-1].note == "why"
+    assert jobs.updates({job.id: 0})[1][job.id][-1].note == "why"
 
 
 def test_release_is_no_attempt(jobs, queue, dataset):
@@ -103,7 +107,7 @@ def test_job_with_progress_is_retried(database, jobs, queue, dataset):
         dying.reset_attempts(job.id)
         assert Queue(database, "folder").recover(PROBLEM) == 1
     assert jobs.get(LOCAL, job.id).attempts == 1
-    assert [event.state for event in jobs.events(LOCAL, job.id)] == [
+    assert [event.state for event in jobs.updates({job.id: 0})[1][job.id]] == [
         "queued",
         *8 * ["running", "queued"],
     ]
