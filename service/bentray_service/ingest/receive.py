@@ -24,6 +24,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.atomic import sync, write_bytes
 
 from ..errors import EmptyBody, Locked, QuotaExceeded, StorageFull, TooLarge, UnknownChecksum, WrongChecksum
+from ..rows.checksums import Digest
 
 # Size of a batch; chunks are written without copying them together.
 BATCH_BYTES, BATCH_CHUNKS = 4 * 1024 * 1024, 1024
@@ -37,14 +38,6 @@ ALGORITHMS = {
     "md5": "[A-Za-z0-9+/]{22}==",
 }
 CHECKSUM = "^(" + "|".join(f"{name} {digest}" for name, digest in ALGORITHMS.items()) + ")$"
-
-
-@dataclass(frozen=True)
-class Received:
-    """Size of a body, and its SHA-256 in hexadecimal."""
-
-    size: int
-    sha256: str
 
 
 def check_announced(announced: int | None, limit: int, expected: str) -> None:
@@ -62,7 +55,7 @@ async def receive(
     limit: int,
     expected: str,
     reserve: Callable[[int], None] = lambda size: None,
-) -> Received:
+) -> Digest:
     """Write a body to ``path``, durably, without blocking the event loop.
 
     Args:
@@ -87,7 +80,7 @@ async def receive(
         await run_in_threadpool(file.close)
     if not size:
         raise EmptyBody("body", "0 bytes", expected)
-    return Received(size, digest.hexdigest())
+    return Digest(size, digest.hexdigest())
 
 
 async def write_body(

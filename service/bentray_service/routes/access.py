@@ -40,8 +40,6 @@ class AccessRecord(BaseModel):
 class StorageRecord(BaseModel):
     """Stored items of one kind."""
 
-    model_config = ConfigDict(from_attributes=True)
-
     kind: StoredKind = Field(
         description="results: volumes of reconstructions; volumes: uploaded ones; jobs: space for unfinished "
         "jobs, and turntables; uploads: unfinished ones."
@@ -102,10 +100,11 @@ def show_access(context: Context) -> AccessRecord:
 def show_storage(context: Context) -> StorageList:
     """Show the storage of the tenant by kind."""
     found = usage_by_kind(context.stores.database, context.tenant)
-    return StorageList(
-        storage=[StorageRecord.model_validate(one) for one in found],
-        bytes_most=context.access.settings.max_tenant_bytes,
-    )
+    storage = [
+        StorageRecord(kind=kind, items=items, stored=stored, reserved=reserved)
+        for kind, (items, stored, reserved) in found.items()
+    ]
+    return StorageList(storage=storage, bytes_most=context.access.settings.max_tenant_bytes)
 
 
 @router.get("/keys", responses=problems(503))

@@ -174,25 +174,12 @@ _BY_PREFIX: dict[str, StoredKind] = {
 }
 
 
-@dataclass(frozen=True)
-class KindUsage:
-    """Stored items of one kind.
+def usage_by_kind(database: Database, tenant: Tenant) -> dict[StoredKind, list[int]]:
+    """Items, stored and reserved bytes of a tenant by kind; kinds without any are left out.
 
-    Attributes:
-        kind: ``results`` are volumes of reconstructions, ``volumes`` uploaded ones, ``jobs`` space for
-            unfinished jobs and finished turntables.
-        items: number of stored items.
-        stored, reserved: bytes.
+    ``results`` are volumes of reconstructions, ``volumes`` uploaded ones, ``jobs`` space for unfinished jobs
+    and finished turntables. Reservations of dead processes do not count.
     """
-
-    kind: StoredKind
-    items: int
-    stored: int
-    reserved: int
-
-
-def usage_by_kind(database: Database, tenant: Tenant) -> list[KindUsage]:
-    """Storage of a tenant by kind, without reservations of dead processes; kinds without any are left out."""
     columns = StorageRow.name, StorageRow.bytes, StorageRow.reserved
     mine = select(*columns).where(StorageRow.tenant == tenant, _counted())
     made = select(ResultVolumeRow.id).where(ResultVolumeRow.tenant == tenant)
@@ -204,7 +191,7 @@ def usage_by_kind(database: Database, tenant: Tenant) -> list[KindUsage]:
         entry = counted[_kind_of(str(name), results)]
         entry[0] += not reserved
         entry[2 if reserved else 1] += int(size)
-    return [KindUsage(kind, *entry) for kind, entry in counted.items() if any(entry)]
+    return {kind: entry for kind, entry in counted.items() if any(entry)}
 
 
 def _kind_of(name: str, results: set[str]) -> StoredKind:

@@ -43,7 +43,7 @@ def test_received_bytes_are_on_disk(tmp_path_factory, chunks, batch):
             return
         received = run(path, chunks)
     assert path.read_bytes() == body
-    assert (received.size, received.sha256) == (len(body), hashlib.sha256(body).hexdigest())
+    assert (received.bytes, received.sha256) == (len(body), hashlib.sha256(body).hexdigest())
 
 
 def test_tiny_chunks_are_bounded(tmp_path, monkeypatch):
@@ -52,7 +52,7 @@ def test_tiny_chunks_are_bounded(tmp_path, monkeypatch):
     monkeypatch.setattr(
         receiving._BatchWriter, "_write", lambda self, batch: (waiting.append(len(batch)), write(self, batch))
     )
-    assert run(tmp_path / "body", [b"x"] * 5000).size == 5000
+    assert run(tmp_path / "body", [b"x"] * 5000).bytes == 5000
     assert max(waiting) <= receiving.BATCH_CHUNKS < 5000
 
 
@@ -62,7 +62,7 @@ def test_rejects_oversize_bodies(tmp_path):
     assert not (tmp_path / "announced").exists()
     with pytest.raises(TooLarge, match="at most 10 bytes"):
         run(tmp_path / "counted", [b"x" * 6, b"y" * 6], limit=10)
-    assert run(tmp_path / "just", [b"x" * 6, b"y" * 4], announced=10, limit=10).size == 10
+    assert run(tmp_path / "just", [b"x" * 6, b"y" * 4], announced=10, limit=10).bytes == 10
 
 
 def test_bytes_before_a_disconnect_are_kept(tmp_path, monkeypatch):

@@ -209,7 +209,7 @@ def test_at_the_start_the_sizes_are_those_of_the_files(database, dataset, tmp_pa
 
 
 def kinds(database, tenant=LOCAL):
-    return {one.kind: (one.items, one.stored, one.reserved) for one in usage_by_kind(database, tenant)}
+    return {kind: tuple(entry) for kind, entry in usage_by_kind(database, tenant).items()}
 
 
 def test_every_kind_is_counted_once(database, jobs):

@@ -15,7 +15,8 @@ from ...errors import Busy
 from ...ingest.canonical import make_canonical
 from ...ingest.fair_queue import FairQueue
 from ...ingest.ingest_process import ACCEPTED, FILE_NAME
-from ...ingest.receive import Received, check_announced, receive
+from ...ingest.receive import check_announced, receive
+from ...rows.checksums import Digest
 from ...rows.ids import Tenant, new_id
 from ...rows.stored_tables import UploadedTable
 from ...rows.tables import DatasetRow, MeshRow, UploadedVolumeRow
@@ -64,9 +65,9 @@ async def receive_upload(
     path = files.incoming(upload_id)
     resize = partial(quota.resize, tenant, upload_id)
 
-    def check_and_store(received: Received) -> Record:
+    def check_and_store(received: Digest) -> Record:
         summary = make_canonical(what, path, upload_id, files, ingest.limits, given, resize)
-        return table.add(tenant, upload_id, size=received.size, sha256=received.sha256, summary=summary)
+        return table.add(tenant, upload_id, size=received.bytes, sha256=received.sha256, summary=summary)
 
     with ingest.upload_limits(tenant):
         async with quota.reserved(tenant, upload_id, length or 1):
