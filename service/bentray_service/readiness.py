@@ -6,7 +6,6 @@ import asyncio
 import shutil
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 
 from sqlalchemy.exc import SQLAlchemyError
 
@@ -22,19 +21,8 @@ from .rows.database import Database
 WITHIN_S = 3.0
 
 
-@dataclass(frozen=True)
-class ReadinessReport:
-    """The result of a check.
-
-    Attributes:
-        faults: (part, found, needed) of each part that does not work.
-        workers: number of connected workers.
-        free_bytes: free space in the data folder.
-    """
-
-    faults: tuple[tuple[str, str, str], ...]
-    workers: int
-    free_bytes: int
+# (part, found, needed) of a part that does not work.
+Fault = tuple[str, str, str]
 
 
 class Readiness:
@@ -56,32 +44,35 @@ class Readiness:
         self._database, self._files, self._compute = database, files, compute
         self.threads, self._min_free_bytes = threads, min_free_bytes
         self._pool = ThreadPoolExecutor(1, "readiness")
-        self._inspecting: asyncio.Future[ReadinessReport] | None = None
+        self._inspecting: asyncio.Future[tuple[list[Fault], int, int]] | None = None
         # The part that is being checked.
         self._part = "service"
 
-    async def report(self) -> ReadinessReport:
-        """The result of the current check, or of a new one.
+    async def check(self) -> tuple[int, int]:
+        """Connected workers and free bytes in the data folder, by the current check or a new one.
 
         Raises:
-            NotReady: naming the part that does not answer in time.
+            NotReady: naming the parts that do not work, or the one that does not answer in time.
         """
         if self._inspecting is None or self._inspecting.done():
             self._inspecting = asyncio.get_running_loop().run_in_executor(self._pool, self._inspect)
         try:
             async with asyncio.timeout(WITHIN_S):
-                return await asyncio.shield(self._inspecting)
+                faults, workers, free = await asyncio.shield(self._inspecting)
         except TimeoutError:
             raise NotReady(
                 [(self._part, f"no answer in {WITHIN_S:g} s", "an answer within this time")]
             ) from None
+        if faults:
+            raise NotReady(faults)
+        return workers, free
 
     def stop(self) -> None:
         """Start no further checks."""
         self._pool.shutdown(wait=False, cancel_futures=True)
 
-    def _inspect(self) -> ReadinessReport:
-        faults: list[tuple[str, str, str]] = []
+    def _inspect(self) -> tuple[list[Fault], int, int]:
+        faults: list[Fault] = []
         self._part = "database"
         try:
             self._database.probe()
@@ -103,4 +94,4 @@ class Readiness:
         for part, owner in self.threads.items():
             if not owner.alive():
                 faults.append((part, "a thread has ended", "all threads alive; restart the service"))
-        return ReadinessReport(tuple(faults), workers, free)
+        return faults, workers, free

@@ -8,7 +8,6 @@ import logging
 import os
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from datetime import timedelta
 from pathlib import Path
 from typing import Any
@@ -39,15 +38,6 @@ AWS_SETTINGS = {
     "region": "AWS_DEFAULT_REGION",
     "endpoint_url": "AWS_ENDPOINT_URL",
 }
-
-
-@dataclass(frozen=True)
-class BucketObject:
-    """An object: key below the prefix, size, and time of last modification, s since 1970."""
-
-    key: str
-    size: int
-    changed: float
 
 
 class Bucket:
@@ -121,16 +111,15 @@ class Bucket:
             return None
         return {**{str(name): text for name, text in head.attributes.items()}, "size": str(head.meta["size"])}
 
-    def listed(self, under: str = "") -> Iterator[BucketObject]:
-        """All objects in the folder ``under``, or in the whole bucket."""
+    def listed(self, under: str = "") -> Iterator[obstore.ObjectMeta]:
+        """All objects in the folder ``under``, or in the whole bucket; ``path`` is the key."""
         pages = iter(obstore.list(self._store, prefix=under or None))
         while True:
             with self._watched():
                 page = next(pages, None)
             if page is None:
                 return
-            for entry in page:
-                yield BucketObject(entry["path"], entry["size"], entry["last_modified"].timestamp())
+            yield from page
 
     def remove(self, keys: Collection[str]) -> None:
         """Delete objects; missing ones are ignored."""

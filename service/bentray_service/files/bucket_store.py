@@ -216,7 +216,7 @@ class BucketStore(Store):
 
     def tidy(self, stop: Callable[[], bool]) -> None:
         """Delete orphaned objects and cached files, and publish files that are in the data folder only."""
-        held = {one.key: one.changed for one in self._bucket.listed("tenants/")}
+        held = {one["path"]: one["last_modified"].timestamp() for one in self._bucket.listed("tenants/")}
         lying = list(self._cache.stored_paths())
         # Queried last, so that files created meanwhile have a row or are new.
         names, now = self._known.names(), time.time()

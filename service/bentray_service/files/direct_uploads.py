@@ -41,8 +41,8 @@ class DirectUploads:
 
     def received(self, row: UploadRow) -> dict[int, int]:
         """Sizes of the parts in the bucket by number, in their order."""
-        held = sorted(self._bucket.listed(_folder(row)), key=lambda item: item.key)
-        return {int(piece.key.rpartition("/")[2]): piece.size for piece in held}
+        held = sorted(self._bucket.listed(_folder(row)), key=lambda piece: piece["path"])
+        return {int(piece["path"].rpartition("/")[2]): piece["size"] for piece in held}
 
     def fetch(self, row: UploadRow, path: Path) -> None:
         """Download all parts to ``path``, one after the other.
@@ -61,7 +61,7 @@ class DirectUploads:
         Raises:
             StorageUnavailable: when they cannot be deleted now.
         """
-        self._bucket.remove([piece.key for piece in self._bucket.listed(_folder(row))])
+        self._bucket.remove([piece["path"] for piece in self._bucket.listed(_folder(row))])
 
     def drop_later(self, row: UploadRow) -> None:
         """Delete all parts; if that is not possible now, ``tidy`` does it."""
@@ -75,8 +75,9 @@ class DirectUploads:
         held = list(self._bucket.listed(FOLDER))
         # Queried last: the row of an upload is older than its data.
         current, now = ids(), time.time()
-        unknown = [piece for piece in held if piece.key.removeprefix(FOLDER).partition("/")[0] not in current]
-        self._bucket.remove([piece.key for piece in unknown if now - piece.changed > FORGOTTEN_S])
+        unknown = [piece for piece in held if piece["path"].split("/")[1] not in current]
+        old = [piece for piece in unknown if now - piece["last_modified"].timestamp() > FORGOTTEN_S]
+        self._bucket.remove([piece["path"] for piece in old])
 
 
 def part_sizes(length: int) -> list[int]:

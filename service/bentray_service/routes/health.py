@@ -7,7 +7,6 @@ from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.concurrency import run_in_threadpool
 
-from ..errors import NotReady
 from ..readiness import Readiness
 from ..web.errors import problems
 from ..wiring import Context
@@ -42,10 +41,8 @@ async def live() -> Alive:
 async def ready(request: Request) -> Ready:
     """Readiness: whether uploads and jobs can be processed now; otherwise each fault is named."""
     readiness: Readiness = request.app.state.background.readiness
-    seen = await readiness.report()
-    if seen.faults:
-        raise NotReady(seen.faults)
-    return Ready(workers=seen.workers, free_bytes=seen.free_bytes)
+    workers, free = await readiness.check()
+    return Ready(workers=workers, free_bytes=free)
 
 
 @metrics_router.get(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated, Literal, Union
 from urllib.parse import urlencode
 
@@ -211,9 +212,7 @@ def plan_job(job_request: JobRequest, context: Context) -> EstimateRecord:
     found = estimate(new.plan, jobs.durations(context.tenant, new.kind, READ))
     return EstimateRecord(
         plan=None if new.plan is None else PlanRecord.model_validate(new.plan),
-        minutes=found.minutes,
         rough=found.rough,
-        compared=found.compared,
-        basis=found.basis,
+        **asdict(found),
         ahead=jobs.next_place(context.tenant),
     )

@@ -140,8 +140,8 @@ def test_a_folder_from_before_there_was_a_bucket_is_put_into_it(start, uploaded,
     dataset = uploaded(http)
     http.__exit__(None, None, None)
     http = start("data", storage_url=bucket_url)
-    wait_until(lambda: [item.key for item in Bucket(bucket_url).listed("tenants/")])
-    assert [item.key for item in Bucket(bucket_url).listed("tenants/")] == [
+    wait_until(lambda: [item["path"] for item in Bucket(bucket_url).listed("tenants/")])
+    assert [item["path"] for item in Bucket(bucket_url).listed("tenants/")] == [
         f"tenants/local/datasets/{dataset}.h5"
     ]
     assert http.get("/health/ready").status_code == 200

@@ -183,7 +183,7 @@ class TestBucketStore(StoreSuite):
         later = time.time() + max(FORGOTTEN_S, LEFT_S) + 60.0
         monkeypatch.setattr(bucket_store, "time", SimpleNamespace(**vars(time) | {"time": lambda: later}))
         files.store.tidy(lambda: False)
-        left = {one.key.rpartition("/")[2] for one in bucket.listed("tenants/")}
+        left = {one["path"].rpartition("/")[2] for one in bucket.listed("tenants/")}
         assert left == {kept.name, alone.name}
         assert not forgotten.exists()
         assert not orphan.exists()

@@ -24,7 +24,7 @@ def service(start, bucket_url):
 @pytest.fixture
 def objects(bucket_url):
     """Keys of the objects beside the stored items."""
-    return lambda: [one.key for one in Bucket(bucket_url).listed(direct_uploads.FOLDER)]
+    return lambda: [one["path"] for one in Bucket(bucket_url).listed(direct_uploads.FOLDER)]
 
 
 def begun(http, data, **more):
