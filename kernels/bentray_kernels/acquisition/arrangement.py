@@ -224,12 +224,9 @@ def _grid_orders(position: Floats) -> Iterator[tuple[str, Ints]]:
         # The axis that counts most is the last one of the masks of MATLAB, which is the usual case.
         for signs in product((1, -1), repeat=2) if len(axes) == 2 else ((1, 1, 1),):
             for keys in permutations(reversed(axes)):
-                names = "".join(f"{'-' if s < 0 else ''}{'xyz'[a]}" for a, s in zip(keys, signs, strict=True))
-                name = "grid-" + names.replace("-", "minus") + ending
-                yield (
-                    name,
-                    np.lexsort([s * rounded[:, a] for a, s in reversed(list(zip(keys, signs, strict=True)))]),
-                )
+                signed = list(zip(keys, signs, strict=True))
+                names = "".join(f"{'minus' if s < 0 else ''}{'xyz'[a]}" for a, s in signed)
+                yield f"grid-{names}{ending}", np.lexsort([s * rounded[:, a] for a, s in reversed(signed)])
 
 
 def _pitch(position: Floats) -> float:
@@ -390,14 +387,11 @@ class _Times:
             return math.nan
         # A fixed shuffle, so that the verdict does not change from run to run.
         mixed = np.random.default_rng(0).permutation(y)
-        return min(
-            float(
-                np.divide(
-                    *(_measure(v[None] - slope * x, np.inf, median=True).typical[0] for v in (y, mixed))
-                )
-            )
+        sizes = (
+            [_measure(v[None] - slope * x, np.inf, median=True).typical[0] for v in (y, mixed)]
             for slope in self._slownesses(x, y)
         )
+        return min(float(size / of_mixed) for size, of_mixed in sizes)
 
 
 def find_mismatch(dataset: Dataset) -> Mismatch | None:

@@ -94,27 +94,30 @@ def depth_inside(position_m: Floats, places_m: Floats) -> Floats:
     Raises:
         InvalidInput: as ``check_extent``.
     """
-    from scipy.spatial import ConvexHull
-
     check_extent(position_m)
-    faces = np.unique(np.round(ConvexHull(position_m).equations, 9), axis=0)
+    faces = _hull(position_m)
     return np.asarray(-(places_m @ faces[:, :-1].T + faces[:, -1]).max(axis=1))
 
 
-def _faces(position: Floats, rim_nodes: float) -> Floats:
-    """Outward unit normals and offsets of the faces of the hull, (faces, ndim + 1), without open ends."""
+def _hull(position: Floats) -> Floats:
+    """Outward unit normals and offsets of the faces of the hull, (faces, ndim + 1)."""
     # SciPy is not needed to check an upload, which imports this module.
     from scipy.spatial import ConvexHull
 
     # Flat faces are divided into triangles, each with the same equation.
-    faces = np.unique(np.round(ConvexHull(position).equations, 9), axis=0)
+    return np.unique(np.round(ConvexHull(position).equations, 9), axis=0)
+
+
+def _faces(position: Floats, rim_nodes: float) -> Floats:
+    """Outward unit normals and offsets of the faces of the hull, (faces, ndim + 1), without open ends."""
+    faces = _hull(position)
     if position.shape[1] == 2:
-        return np.asarray(faces)
+        return faces
     for end in (1.0, -1.0):
         lid = end * faces[:, 2] > LEVEL
         if lid.any() and _open(position, end, rim_nodes):
             faces = faces[~lid]
-    return np.asarray(faces)
+    return faces
 
 
 def _open(position: Floats, end: float, rim_nodes: float) -> bool:

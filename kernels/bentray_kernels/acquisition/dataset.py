@@ -113,15 +113,11 @@ class Dataset:
             check_size(path, shape)
         position = self.element_position_m
         if position.ndim != 2 or position.shape[1] not in (2, 3) or len(position) < 3:
-            raise InvalidInput(
-                "geometry/element_position_m",
-                f"shape {position.shape}",
-                "(elements, 2 or 3), at least 3 elements",
-            )
+            raise InvalidInput(POSITION, f"shape {position.shape}", "(elements, 2 or 3), at least 3 elements")
         bad = np.flatnonzero(~np.isfinite(position).all(axis=1))
         if bad.size:
             raise InvalidInput(
-                "geometry/element_position_m",
+                POSITION,
                 f"{position[bad[0]].tolist()} for element {bad[0]} ({bad.size} such elements)",
                 "finite coordinates in metres",
             )

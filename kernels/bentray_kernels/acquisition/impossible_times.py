@@ -168,18 +168,9 @@ def _impossible(times: Floats, geometry: Geometry, *, absolute: bool) -> Iterato
 
 def _nearest(geometry: Geometry) -> float:
     """A lower bound of the time between two elements in water, s: that of the nearest ones of a sample."""
-    return (
-        min(
-            (
-                float(np.nanmin(d))
-                for e in range(len(geometry.tx))
-                if np.isfinite(d := geometry.distance_m(e)).any()
-            ),
-            default=0.0,
-        )
-        / geometry.water_speed_mps
-        * (1.0 - AT_ONCE)
-    )
+    distances = (geometry.distance_m(e) for e in range(len(geometry.tx)))
+    nearest = min((float(np.nanmin(d)) for d in distances if np.isfinite(d).any()), default=0.0)
+    return nearest / geometry.water_speed_mps * (1.0 - AT_ONCE)
 
 
 def _at_once(times: Floats, geometry: Geometry, *, absolute: bool) -> Flags:

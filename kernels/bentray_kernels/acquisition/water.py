@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ..errors import InvalidInput
 from ..requests.limits import WATER_C
 
@@ -31,10 +33,7 @@ def speed_from_temperature(temperature_c: float) -> float:
     low, high = RANGE_C
     if not low <= temperature_c <= high:
         raise InvalidInput("water@temperature_c", temperature_c, f"a temperature from {low:g} to {high:g} °C")
-    speed = 0.0
-    for coefficient in reversed(MARCZAK):
-        speed = speed * temperature_c + coefficient
-    return speed
+    return float(np.polyval(MARCZAK[::-1], temperature_c))
 
 
 def temperature_from_speed(speed_mps: float) -> float:

@@ -133,28 +133,28 @@ def _moved_ring(dataset: Dataset, settings: Settings) -> Pairs:
 
 def _between(dataset: Dataset, settings: Settings, tx: Ints, rx: Ints, members: Ints) -> Pairs:
     """The pairs between some elements, with reverse pairs if the settings use reciprocity."""
-    delta, ratio = dataset.differential_tof(), dataset.log_ratio_np
-    if ratio is not None:
+    data = [dataset.differential_tof()]
+    if dataset.log_ratio_np is not None:
         usable = tx[:, None] != rx[None, :]
-        ratio = np.where(usable if dataset.valid is None else usable & dataset.valid, ratio, np.nan)
+        usable = usable if dataset.valid is None else usable & dataset.valid
+        data.append(np.where(usable, dataset.log_ratio_np, np.nan))
     if settings.opening_angle_deg is not None:
         inside = within_opening(dataset, settings.opening_angle_deg)
-        delta = np.where(inside, delta, np.nan)
-        ratio = None if ratio is None else np.where(inside, ratio, np.nan)
-    sent, received = np.isin(tx, members), np.isin(rx, members)
+        data = [np.where(inside, values, np.nan) for values in data]
     if len(members) < len(dataset.element_position_m):
+        sent, received = np.isin(tx, members), np.isin(rx, members)
         tx, rx = tx[sent], rx[received]
-        delta = delta[np.ix_(sent, received)]
-        ratio = None if ratio is None else ratio[np.ix_(sent, received)]
-    emitters, receivers, noise = tx, rx, reciprocal_noise(tx, rx, delta)
+        data = [values[np.ix_(sent, received)] for values in data]
+    emitters, receivers, noise = tx, rx, reciprocal_noise(tx, rx, data[0])
     if settings.numerics.reciprocity and tx.size and rx.size:
-        if ratio is not None:
-            _, _, ratio = _with_reverses(tx, rx, ratio)
-        emitters, receivers, delta = _with_reverses(tx, rx, delta)
-    position = dataset.element_position_m
-    return Pairs(
-        position[emitters], position[receivers][None], np.zeros(len(emitters), np.int64), delta, ratio, noise
-    )
+        # Travel times are reciprocal, so half of the matrix determines the other half, and every emitter then
+        # has receivers on all sides of the object.
+        emitters = receivers = np.union1d(tx, rx)
+        squares = [_by_element(tx, rx, values)[1] for values in data]
+        data = [np.where(np.isfinite(square), square, square.T) for square in squares]
+    position, ring = dataset.element_position_m, np.zeros(len(emitters), np.int64)
+    ratio = data[1] if len(data) > 1 else None
+    return Pairs(position[emitters], position[receivers][None], ring, data[0], ratio, noise)
 
 
 def reciprocal_noise(tx: Ints, rx: Ints, delta: Floats) -> float:
@@ -174,16 +174,6 @@ def reciprocal_differences(tx: Ints, rx: Ints, delta: Floats) -> Floats:
     elements, full = _by_element(tx, rx, delta)
     differences = (full - full.T)[np.triu_indices(len(elements), 1)]
     return np.asarray(differences[np.isfinite(differences)])
-
-
-def _with_reverses(tx: Ints, rx: Ints, delta: Floats) -> tuple[Ints, Ints, Floats]:
-    """All elements as both emitters and receivers, with missing pairs filled by their reverse.
-
-    Travel times are reciprocal, so half of the matrix determines the other half, and every emitter then has
-    receivers on all sides of the object.
-    """
-    elements, full = _by_element(tx, rx, delta)
-    return elements, elements, np.where(np.isfinite(full), full, full.T)
 
 
 def _by_element(tx: Ints, rx: Ints, delta: Floats) -> tuple[Ints, Floats]:

@@ -57,13 +57,9 @@ class RoundRegion:
             raise InvalidInput("centre_m", self.centre_m, f"{len(shape)} coordinates in m, as the image has")
         if not (np.isfinite(spacing_m).all() and np.isfinite(origin_m).all()):
             raise InvalidInput("region", "one of a volume of uneven slices", "evenly spaced slices")
-        squared = np.zeros(tuple(shape))
-        for axis, (n, step, start, centre) in enumerate(
-            zip(shape, spacing_m, origin_m, self.centre_m, strict=True)
-        ):
-            away = start + step * np.arange(n) - centre
-            squared += (away**2).reshape(tuple(-1 if k == axis else 1 for k in range(len(shape))))
-        away = np.sqrt(squared)
+        grid = zip(shape, spacing_m, origin_m, self.centre_m, strict=True)
+        lines = np.ix_(*(start + step * np.arange(n) - centre for n, step, start, centre in grid))
+        away = np.sqrt(sum(line**2 for line in lines))
         inside = away <= self.radius_m
         if not inside.any():
             raise InvalidInput("region", f"{self}, between all nodes", "a region with at least one node")

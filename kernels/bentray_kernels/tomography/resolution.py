@@ -58,8 +58,5 @@ def recovery(problem: Problem, blocks: Sequence[Rows], width: float = 0.0) -> Fl
 
 def _checkerboard(shape: tuple[int, ...]) -> Floats:
     """+1 and −1 by turns, in fields of ``FIELD_NODES`` nodes."""
-    fields = np.zeros(shape, np.int64)
-    for axis, n in enumerate(shape):
-        along = np.arange(n) // FIELD_NODES
-        fields += along.reshape([-1 if a == axis else 1 for a in range(len(shape))])
+    fields = sum(np.ix_(*(np.arange(n) // FIELD_NODES for n in shape)))
     return np.asarray(1.0 - 2.0 * (fields % 2))

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from bentray_kernels.acquisition import Dataset
-from bentray_kernels.acquisition.reference import ReferenceShot
+from bentray_kernels.acquisition.reference.reference_shot import ReferenceShot
 from bentray_kernels.errors import InvalidInput
 
 from .atomic import atomic_replace

@@ -31,12 +31,8 @@ from bentray_kernels.acquisition.quality.left_out import (
     find_too_few,
 )
 from bentray_kernels.acquisition.quality.recording import Measured, check_traces
-from bentray_kernels.acquisition.reference import (
-    ChordPulses,
-    WaterChords,
-    find_water_chords,
-    read_pulses,
-)
+from bentray_kernels.acquisition.reference.chord_pulses import ChordPulses, read_pulses
+from bentray_kernels.acquisition.reference.water_chords import WaterChords, find_water_chords
 from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.requests.limits import MAX_LEFT_OUT

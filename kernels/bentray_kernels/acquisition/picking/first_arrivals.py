@@ -13,7 +13,7 @@ from ...requests.names import DEFAULT_PICKER
 from ..dataset import Dataset, Floats
 from .consistency import consistent
 from .differential import emission
-from .pickers import PICKERS, Picker, picker_named
+from .pickers import PICKERS, picker_named
 from .pulse import Inverse
 
 __all__ = ["PICKERS", "pick"]
@@ -92,12 +92,20 @@ def read_times(
     Returns:
         Object minus water and its standard deviation, (emissions, nrx), s; NaN without an arrival.
     """
-    chosen = picker_named(picker)
+    chosen, traces, position = picker_named(picker), dataset.traces, dataset.element_position_m
     inverse = Inverse.from_dataset(dataset) if chosen.filtered else None
+    scan = dataset.water_speed_mps, dataset.rate_hz, dataset.t0_s, dataset.frequency_hz
+    speed, rate, start, frequency = map(float, scan)
     delta = np.empty((len(emissions), len(dataset.rx)))
     sigma = np.empty_like(delta)
     for row, e in enumerate(emissions):
-        _pick_emission(dataset, e, chosen, inverse, delta[row], sigma[row])
+        rounding = ROUNDING if traces.object.dtype.kind == "i" else 0.0
+        object_, water = (np.ascontiguousarray(t[e]) for t in (traces.object, traces.water_traces))
+        if inverse is not None:
+            object_, water, rounding = inverse(object_), inverse(water), inverse.gain * rounding
+        distance = np.linalg.norm(position[dataset.rx] - position[dataset.tx[e]], axis=1)
+        settings = speed, rate, start, frequency, rounding, chosen.code
+        emission(object_, water, distance, *settings, delta[row], sigma[row])
         done(e)
     return delta, sigma
 
@@ -140,33 +148,3 @@ def require_traces(dataset: Dataset, *, water: bool = True) -> None:
         raise InvalidInput(
             "acquisition@center_frequency_hz", "nothing", "the centre frequency of the pulse, Hz"
         )
-
-
-def _pick_emission(
-    dataset: Dataset,
-    e: int,
-    picker: Picker,
-    inverse: Inverse | None,
-    delta: Floats,
-    sigma: Floats,
-) -> None:
-    traces = dataset.traces
-    rounding = ROUNDING if traces.object.dtype.kind == "i" else 0.0
-    object_, water = (np.ascontiguousarray(t[e]) for t in (traces.object, traces.water_traces))
-    if inverse is not None:
-        object_, water, rounding = inverse(object_), inverse(water), inverse.gain * rounding
-    emission(
-        object_,
-        water,
-        np.linalg.norm(
-            dataset.element_position_m[dataset.rx] - dataset.element_position_m[dataset.tx[e]], axis=1
-        ),
-        float(dataset.water_speed_mps),
-        float(dataset.rate_hz),
-        float(dataset.t0_s),
-        float(dataset.frequency_hz),
-        rounding,
-        picker.code,
-        delta,
-        sigma,
-    )

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
 from ...errors import InvalidInput
 from ..angular_coverage import angular_coverage
 from ..dataset import Dataset
-from ..reference import chord_offset
+from ..reference.water_chords import chord_offset
 from .contradictions import CYCLES
 from .elements import CLOCK, DISPLACED
 from .finding import Finding
@@ -23,7 +23,7 @@ COVERAGE = "angular coverage"
 LEVEL_M = 1e-5
 
 
-def find_limited_angle(dataset: Dataset) -> list[Finding]:
+def find_limited_angle(dataset: Dataset) -> Iterator[Finding]:
     """Find an array whose paths do not cross the object in every direction.
 
     Args:
@@ -43,11 +43,12 @@ def find_limited_angle(dataset: Dataset) -> list[Finding]:
         start, end = position[dataset.tx[emission]], position[dataset.rx[reception]]
         coverage = angular_coverage(elements, start, end)
     except InvalidInput as error:
-        return [Finding(COVERAGE, str(error.value), accepted, "reported", value=math.nan)]
+        yield Finding(COVERAGE, str(error.value), accepted, "reported", value=math.nan)
+        return
     if coverage is None or not coverage.limited:
-        return []
+        return
     message, unit = str(coverage).removesuffix("."), "of the directions"
-    return [Finding(COVERAGE, message, accepted, "reported", value=coverage.visible, unit=unit)]
+    yield Finding(COVERAGE, message, accepted, "reported", value=coverage.visible, unit=unit)
 
 
 def inapplicable(dataset: Dataset, checked: Iterable[str]) -> dict[str, str]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from ...arrays import Flags
@@ -13,7 +15,7 @@ from .measures import Measures
 MAX_CLIPPED = 0.25
 
 
-def find_broken(dataset: Dataset, measures: Measures, which: str, reported: Flags) -> list[Finding]:
+def find_broken(dataset: Dataset, measures: Measures, which: str, reported: Flags) -> Iterator[Finding]:
     """Find traces with samples that are not finite, and constant ones.
 
     Args:
@@ -22,7 +24,6 @@ def find_broken(dataset: Dataset, measures: Measures, which: str, reported: Flag
         which: ``object`` or ``water``.
         reported: (ntx, nrx), pairs already left out by another finding.
     """
-    findings = []
     other = (dataset.tx[:, None] != dataset.rx[None, :]) & ~reported
     for check, flags, fault, accepted in (
         ("values", measures.broken, "samples that are not finite", "finite samples"),
@@ -30,35 +31,30 @@ def find_broken(dataset: Dataset, measures: Measures, which: str, reported: Flag
     ):
         pairs = flags & other
         if pairs.any():
-            count = int(pairs.sum())
-            message = f"{which}: {count} traces with {fault}"
-            findings.append(
-                Finding(check, message, accepted, "left out", pairs=pairs, value=float(count), unit="traces")
-            )
-    return findings
+            count = float(pairs.sum())
+            message = f"{which}: {count:.0f} traces with {fault}"
+            yield Finding(check, message, accepted, "left out", pairs=pairs, value=count, unit="traces")
 
 
-def find_clipped(dataset: Dataset, measures: Measures, which: str) -> list[Finding]:
+def find_clipped(dataset: Dataset, measures: Measures, which: str) -> Iterator[Finding]:
     """Find clipped traces: times are valid, since the onset precedes the peak, amplitudes are not."""
     pairs = measures.clipped & (dataset.tx[:, None] != dataset.rx[None, :])
     if not pairs.any():
-        return []
+        return
     fraction = float(pairs.sum()) / max(int(measures.detected.sum()), 1)
     message = f"{which}: {int(pairs.sum())} traces clipped at their highest or lowest value"
     message += ", the gain is too high" if fraction > MAX_CLIPPED else ""
     # Saturated channels, unless all of them are.
     often = pairs.sum(axis=0) > 0.5 * np.maximum(measures.detected.sum(axis=0), 1)
     saturated = dataset.rx[often] if often.sum() < 0.5 * often.size else dataset.rx[:0]
-    return [
-        Finding(
-            "clipping",
-            message,
-            "pulses within the range of the recorder",
-            "reported",
-            tuple(int(k) for k in saturated),
-            "reception" if saturated.size else "",
-            pairs=np.asarray(pairs),
-            value=fraction,
-            unit="of all traces",
-        )
-    ]
+    yield Finding(
+        "clipping",
+        message,
+        "pulses within the range of the recorder",
+        "reported",
+        tuple(int(k) for k in saturated),
+        "reception" if saturated.size else "",
+        pairs=np.asarray(pairs),
+        value=fraction,
+        unit="of all traces",
+    )

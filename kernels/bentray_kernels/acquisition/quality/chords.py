@@ -7,7 +7,7 @@ import numpy as np
 from ...arrays import Flags, Floats
 from ...errors import InvalidInput
 from ..dataset import Dataset
-from ..reference import WaterChords, chord_offset, find_water_chords
+from ..reference.water_chords import WaterChords, chord_offset, find_water_chords
 from .correction import apply, exchange_order
 from .drift import find_drift
 from .elements import CLOCK, find_element_errors
@@ -38,7 +38,7 @@ def examine_chords(dataset: Dataset, measures: Measures) -> tuple[list[Finding],
     if mismatch := find_wrong_order(dataset, strongest):
         raise InvalidInput(ORDER, mismatch[0].found, mismatch[0].accepted)
     chords = find_water_chords(dataset, strongest)
-    findings = find_swapped(dataset, strongest, _expected(dataset, chords))
+    findings = list(find_swapped(dataset, strongest, _expected(dataset, chords)))
     if findings:
         for finding in findings:
             order, axis = exchange_order(dataset, finding)
@@ -46,7 +46,7 @@ def examine_chords(dataset: Dataset, measures: Measures) -> tuple[list[Finding],
         dataset = apply(dataset, findings)
         chords = find_water_chords(dataset, strongest)
     late = strongest - _expected(dataset, chords)
-    errors = find_element_errors(dataset, late)
+    errors = list(find_element_errors(dataset, late))
     findings += errors
     emission, reception = np.zeros(len(dataset.tx)), np.zeros(len(dataset.rx))
     for finding in errors:

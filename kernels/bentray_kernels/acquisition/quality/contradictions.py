@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
-from ...arrays import Flags, Floats
+from ...arrays import Floats
 from ..dataset import Dataset
 from ..picking.consistency import contradictions
 from .finding import Finding
@@ -16,7 +17,7 @@ CYCLES, APPARENT = "cycle jumps", "apparent speed"
 NEAR_A_CYCLE = 0.25
 
 
-def find_contradictions(dataset: Dataset, delta: Floats) -> list[Finding]:
+def find_contradictions(dataset: Dataset, delta: Floats) -> Iterator[Finding]:
     """Find impossible apparent speeds, cycle jumps, outliers and violations of reciprocity, each pair in one.
 
     Args:
@@ -31,29 +32,21 @@ def find_contradictions(dataset: Dataset, delta: Floats) -> list[Finding]:
     allowed = f"within {1e9 * found.skip_s:.0f} ns"
     speeds = "{:.0f} to {:.0f} m/s, far beyond those of most pairs".format(*found.speeds_mps)
     others = found.outlying & ~cycles
-    return [
-        *_left_out(APPARENT, found.apparent, found.excess_s, "too early or too late for any path", speeds),
-        *_left_out(CYCLES, cycles, departure, "whole periods from their neighbours", allowed),
-        *_left_out("outliers", others, departure, "far from the median of neighbours", allowed),
-        *_left_out(
-            "reciprocity", found.unreciprocal, departure, "that differ from their reciprocal pair", allowed
-        ),
-    ]
-
-
-def _left_out(check: str, pairs: Flags, departure: Floats, fault: str, accepted: str) -> list[Finding]:
-    if not pairs.any():
-        return []
-    off = np.abs(departure[pairs])
-    off = off[np.isfinite(off)]
-    return [
-        Finding(
-            check,
-            f"{int(pairs.sum())} pairs {fault}",
-            accepted,
-            "left out",
-            pairs=np.asarray(pairs),
-            value=float(np.median(off)) if off.size else math.nan,
-            unit="s, median",
-        )
-    ]
+    for check, pairs, off, fault, accepted in (
+        (APPARENT, found.apparent, found.excess_s, "too early or too late for any path", speeds),
+        (CYCLES, cycles, departure, "whole periods from their neighbours", allowed),
+        ("outliers", others, departure, "far from the median of neighbours", allowed),
+        ("reciprocity", found.unreciprocal, departure, "that differ from their reciprocal pair", allowed),
+    ):
+        if pairs.any():
+            sizes = np.abs(off[pairs])
+            sizes = sizes[np.isfinite(sizes)]
+            yield Finding(
+                check,
+                f"{int(pairs.sum())} pairs {fault}",
+                accepted,
+                "left out",
+                pairs=np.asarray(pairs),
+                value=float(np.median(sizes)) if sizes.size else math.nan,
+                unit="s, median",
+            )

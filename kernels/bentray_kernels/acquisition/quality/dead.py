@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from ...arrays import Flags
@@ -16,7 +18,7 @@ MIN_DETECTED = 0.1
 USUALLY_DETECTED = 0.5
 
 
-def find_dead(dataset: Dataset, detected: Flags) -> list[Finding]:
+def find_dead(dataset: Dataset, detected: Flags) -> Iterator[Finding]:
     """Find elements that do not emit or do not receive.
 
     Args:
@@ -24,7 +26,6 @@ def find_dead(dataset: Dataset, detected: Flags) -> list[Finding]:
         detected: (ntx, nrx), whether a pair has a pulse or a time.
     """
     other = np.asarray(dataset.tx[:, None] != dataset.rx[None, :])
-    findings = []
     roles: tuple[tuple[Role, int], ...] = (("emission", 1), ("reception", 0))
     for role, axis in roles:
         element = dataset.tx if role == "emission" else dataset.rx
@@ -36,17 +37,14 @@ def find_dead(dataset: Dataset, detected: Flags) -> list[Finding]:
         if dead.size and np.median(fraction) >= USUALLY_DETECTED:
             pairs = np.zeros_like(detected)
             pairs[(dead, slice(None)) if axis == 1 else (slice(None), dead)] = True
-            findings.append(
-                Finding(
-                    "dead elements",
-                    f"{dead.size} without a pulse in {role}",
-                    f"a pulse in {100 * MIN_DETECTED:.0f} % of an element's pairs",
-                    "left out",
-                    tuple(int(k) for k in element[dead]),
-                    role,
-                    pairs,
-                    float(fraction[dead].max()),
-                    "of its pairs",
-                )
+            yield Finding(
+                "dead elements",
+                f"{dead.size} without a pulse in {role}",
+                f"a pulse in {100 * MIN_DETECTED:.0f} % of an element's pairs",
+                "left out",
+                tuple(int(k) for k in element[dead]),
+                role,
+                pairs,
+                float(fraction[dead].max()),
+                "of its pairs",
             )
-    return findings

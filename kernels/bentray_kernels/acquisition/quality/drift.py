@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from ...arrays import Floats
@@ -22,7 +24,7 @@ MPS_PER_DEGREE = 2.9
 MIN_CHORDS, MIN_EMISSIONS, MIN_SPREAD = 5, 12, 0.05
 
 
-def find_drift(dataset: Dataset, residual_s: Floats) -> list[Finding]:
+def find_drift(dataset: Dataset, residual_s: Floats) -> Iterator[Finding]:
     """Find a change of the water speed from the first to the last emission.
 
     Args:
@@ -38,23 +40,21 @@ def find_drift(dataset: Dataset, residual_s: Floats) -> list[Finding]:
         emissions.append(float(e))
         slopes.append(robust_line(distance[e][finite], row[finite])[0])
     if len(emissions) < MIN_EMISSIONS:
-        return []
+        return
     order, slope = np.array(emissions), np.array(slopes)
     each, start = robust_line(order, slope)
     whole = (len(dataset.tx) - 1) * dataset.water_speed_mps**2
     sigma = robust_deviation(slope - each * order - start) / (np.std(order) * np.sqrt(order.size)) * whole
     change = -each * whole
     if abs(change) <= max(MIN_MPS, CERTAIN * sigma):
-        return []
+        return
     warmer = "warms" if change > 0.0 else "cools"
-    return [
-        Finding(
-            DRIFT,
-            f"the water {warmer} by {abs(change) / MPS_PER_DEGREE:.1f} °C "
-            f"({abs(change):.1f} ± {sigma:.1f} m/s) from the first to the last emission",
-            f"within {MIN_MPS:g} m/s; speeds are uncertain by half of the change",
-            "reported",
-            value=float(change),
-            unit="m/s",
-        )
-    ]
+    yield Finding(
+        DRIFT,
+        f"the water {warmer} by {abs(change) / MPS_PER_DEGREE:.1f} °C "
+        f"({abs(change):.1f} ± {sigma:.1f} m/s) from the first to the last emission",
+        f"within {MIN_MPS:g} m/s; speeds are uncertain by half of the change",
+        "reported",
+        value=float(change),
+        unit="m/s",
+    )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from ...arrays import Floats, Ints
@@ -19,7 +21,7 @@ MIN_DELAY, MIN_DISPLACEMENT, UNUSUAL = 0.1, 0.08, 6.0
 MAX_PART = 0.4
 
 
-def find_element_errors(dataset: Dataset, residual_s: Floats) -> list[Finding]:
+def find_element_errors(dataset: Dataset, residual_s: Floats) -> Iterator[Finding]:
     """Find modules whose clock is late or early, and elements away from their stated positions.
 
     Args:
@@ -27,30 +29,27 @@ def find_element_errors(dataset: Dataset, residual_s: Floats) -> list[Finding]:
         residual_s: (ntx, nrx), s: times in water minus those of the stated positions; NaN where unknown.
     """
     if dataset.element_position_m.shape[1] != 2:
-        return []
+        return
     errors = fit_element_errors(dataset, residual_s)
     least_s = MIN_DELAY / dataset.frequency_hz
     roles: tuple[tuple[Role, Floats, Floats], ...] = (
         ("emission", errors.emission_delay_s, errors.sigma_s[:, 2]),
         ("reception", errors.reception_delay_s, errors.sigma_s[:, 3]),
     )
-    findings = []
     for role, delay, sigma in roles:
         off = delay - np.nanmedian(delay) if np.isfinite(delay).any() else delay
         for run in _runs(_unusual(off, sigma, least_s), off):
             value = float(np.median(off[run]))
             late = f"{'late' if value > 0.0 else 'early'} by {1e9 * abs(value):.0f} ns"
-            findings.append(
-                Finding(
-                    CLOCK,
-                    f"{_named(run)} {late} in {role}",
-                    f"within {1e9 * least_s:.0f} ns, a tenth of a period",
-                    "reported",
-                    tuple(run.tolist()),
-                    role,
-                    value=value,
-                    unit="s",
-                )
+            yield Finding(
+                CLOCK,
+                f"{_named(run)} {late} in {role}",
+                f"within {1e9 * least_s:.0f} ns, a tenth of a period",
+                "reported",
+                tuple(run.tolist()),
+                role,
+                value=value,
+                unit="s",
             )
     distance = np.linalg.norm(errors.displacement_m, axis=1)
     least_m = MIN_DISPLACEMENT * dataset.water_speed_mps / dataset.frequency_hz
@@ -58,18 +57,15 @@ def find_element_errors(dataset: Dataset, residual_s: Floats) -> list[Finding]:
     displaced = _unusual(distance, sigma_m, least_m)
     if displaced.size:
         farthest = float(distance[displaced].max())
-        findings.append(
-            Finding(
-                DISPLACED,
-                f"{_named(displaced)} {1e3 * farthest:.2g} mm from the stated position",
-                f"within {1e3 * least_m:.2g} mm; see bentray quality --calibrate",
-                "reported",
-                tuple(displaced.tolist()),
-                value=farthest,
-                unit="m",
-            )
+        yield Finding(
+            DISPLACED,
+            f"{_named(displaced)} {1e3 * farthest:.2g} mm from the stated position",
+            f"within {1e3 * least_m:.2g} mm; see bentray quality --calibrate",
+            "reported",
+            tuple(displaced.tolist()),
+            value=farthest,
+            unit="m",
         )
-    return findings
 
 
 def _unusual(values: Floats, sigma: Floats, least: float) -> Ints:

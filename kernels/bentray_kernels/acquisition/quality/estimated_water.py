@@ -3,14 +3,9 @@
 from __future__ import annotations
 
 from ..dataset import Dataset
-from ..reference import (
-    ChordPulses,
-    ReferenceShot,
-    WaterChords,
-    chord_signs,
-    estimate_reference,
-    read_pulses,
-)
+from ..reference.chord_pulses import ChordPulses, read_pulses
+from ..reference.reference_shot import ReferenceShot, chord_signs, estimate_reference
+from ..reference.water_chords import WaterChords
 from .chords import examine_chords
 from .correction import apply, pairs_of
 from .finding import Finding
@@ -55,7 +50,7 @@ def estimate_from_pulses(
     """
     findings: list[Finding] = []
     if examine:
-        findings = find_inverted(dataset, chord_signs(dataset, chords, pulses))
+        findings = list(find_inverted(dataset, chord_signs(dataset, chords, pulses)))
     for finding in findings:
         pulses = pulses.inverted(pairs_of(dataset, finding))
     reference = estimate_reference(dataset, chords, pulses)

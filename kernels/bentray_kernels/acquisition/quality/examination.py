@@ -185,7 +185,7 @@ def check_times(dataset: Dataset) -> list[Finding]:
     if any(finding.action == "refused" for finding in findings):
         return findings
     corrected = apply(replace(dataset, waveform=None), findings)
-    later = find_contradictions(corrected, corrected.differential_tof())
+    later = list(find_contradictions(corrected, corrected.differential_tof()))
     if not np.isfinite(apply(corrected, later).differential_tof()).any():
         later.append(Finding("travel times", "no usable ones", "travel times of some pairs", "refused"))
     return findings + later

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -20,7 +21,7 @@ MIN_FRACTION = 0.6
 MIN_PAIRS = 4
 
 
-def find_inverted(dataset: Dataset, sign: Floats) -> list[Finding]:
+def find_inverted(dataset: Dataset, sign: Floats) -> Iterator[Finding]:
     """Find elements with inverted polarity, in emission and in reception.
 
     Args:
@@ -28,7 +29,6 @@ def find_inverted(dataset: Dataset, sign: Floats) -> list[Finding]:
         sign: (ntx, nrx), correlation with the usual pulse, from -1 to 1; NaN where unknown. See
             ``water_signs``, and ``reference.chord_signs`` without a water shot.
     """
-    findings = []
     # Alternate, so that an inverted receiver does not make the emitters appear inverted.
     emission, reception = np.ones(len(dataset.tx)), np.ones(len(dataset.rx))
     for _ in range(4):
@@ -41,19 +41,16 @@ def find_inverted(dataset: Dataset, sign: Floats) -> list[Finding]:
     for role, of_role, element in roles:
         wrong = np.flatnonzero(of_role < 0.0)
         if wrong.size:
-            findings.append(
-                Finding(
-                    "polarity",
-                    f"{wrong.size} inverted in {role}",
-                    "pulses as those of most elements",
-                    "corrected",
-                    tuple(int(k) for k in np.asarray(element)[wrong]),
-                    role,
-                    value=float(wrong.size),
-                    unit="elements",
-                )
+            yield Finding(
+                "polarity",
+                f"{wrong.size} inverted in {role}",
+                "pulses as those of most elements",
+                "corrected",
+                tuple(int(k) for k in np.asarray(element)[wrong]),
+                role,
+                value=float(wrong.size),
+                unit="elements",
             )
-    return findings
 
 
 def water_signs(dataset: Dataset, strongest_s: Floats) -> Floats:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -19,7 +20,7 @@ LARGEST_OFF = 0.05
 MIN_PAIRS = 20
 
 
-def find_displaced(dataset: Dataset, strongest_s: Floats, line: WaterLine) -> list[Finding]:
+def find_displaced(dataset: Dataset, strongest_s: Floats, line: WaterLine) -> Iterator[Finding]:
     """Find water times that deviate from the element positions by more than their noise.
 
     A position error or delay of an element is the same in emission and reception; noise is not. So half the
@@ -36,20 +37,18 @@ def find_displaced(dataset: Dataset, strongest_s: Floats, line: WaterLine) -> li
     there, back = off[once], dataset.geometry.reverses(off)[once]
     both = np.isfinite(there + back)
     if both.sum() < MIN_PAIRS:
-        return []
+        return
     alike, noise = (robust_deviation(0.5 * (there + sign * back)[both]) for sign in (1.0, -1.0))
     apart = math.sqrt(max(alike**2 - noise**2, 0.0)) * dataset.water_speed_mps
     allowed = LARGEST_OFF * dataset.water_speed_mps / dataset.frequency_hz
     if apart <= allowed:
-        return []
-    return [
-        Finding(
-            "element positions",
-            f"water times {1e3 * apart:.2g} mm from those of the positions, equally in both directions: "
-            "positions or delays need calibration",
-            f"within {1e3 * allowed:.2g} mm, a twentieth of a wavelength",
-            "reported",
-            value=apart,
-            unit="m",
-        )
-    ]
+        return
+    yield Finding(
+        "element positions",
+        f"water times {1e3 * apart:.2g} mm from those of the positions, equally in both directions: "
+        "positions or delays need calibration",
+        f"within {1e3 * allowed:.2g} mm, a twentieth of a wavelength",
+        "reported",
+        value=apart,
+        unit="m",
+    )

@@ -125,13 +125,13 @@ def _of_water(dataset: Dataset, strongest: Floats) -> list[Finding]:
         return [Finding("water shot", "almost no pulses", "pulses that crossed the water", "refused")]
     speed = find_water_speed(dataset, line.speed_mps, ENVELOPE * line.speed_mps)
     dataset = apply(dataset, speed)
-    refused = sampling(dataset, line.speed_mps) + frequency(dataset)
+    refused = [*sampling(dataset, line.speed_mps), *frequency(dataset)]
     if refused or dataset.center_frequency_hz is None:
         return refused
     line = WaterLine.from_dataset(dataset, strongest)
     assert line is not None
     straight = dataset.distance_m() / dataset.water_speed_mps + line.intercept_s
-    exchanged = find_swapped(dataset, strongest, straight)
+    exchanged = list(find_swapped(dataset, strongest, straight))
     for finding in exchanged:
         # The maxima after the exchange of channels.
         order, axis = exchange_order(dataset, finding)

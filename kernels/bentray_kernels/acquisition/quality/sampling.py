@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from ..dataset import Dataset
@@ -18,7 +20,7 @@ CERTAIN = 5.0
 LARGEST_FREQUENCY_FACTOR = 1.6
 
 
-def sampling(dataset: Dataset, speed_mps: float, sigma_mps: float = 0.0) -> list[Finding]:
+def sampling(dataset: Dataset, speed_mps: float, sigma_mps: float = 0.0) -> Iterator[Finding]:
     """Inconsistent sampling rate, geometry or water speed: the scan is rejected.
 
     Args:
@@ -29,44 +31,40 @@ def sampling(dataset: Dataset, speed_mps: float, sigma_mps: float = 0.0) -> list
     ratio = speed_mps / dataset.water_speed_mps
     uncertain = CERTAIN * sigma_mps / dataset.water_speed_mps
     if abs(ratio - 1.0) <= LARGEST_SPEED_ERROR + uncertain:
-        return []
-    return [
-        Finding(
-            "sampling rate",
-            f"arrivals in water at {speed_mps:.0f} m/s, {ratio:.3g} times the stated "
-            f"{dataset.water_speed_mps:.0f} m/s: sampling rate, element positions or water speed are wrong",
-            f"within {100 * LARGEST_SPEED_ERROR:g} %",
-            "refused",
-            value=ratio,
-            unit="of the stated speed",
-        )
-    ]
+        return
+    yield Finding(
+        "sampling rate",
+        f"arrivals in water at {speed_mps:.0f} m/s, {ratio:.3g} times the stated "
+        f"{dataset.water_speed_mps:.0f} m/s: sampling rate, element positions or water speed are wrong",
+        f"within {100 * LARGEST_SPEED_ERROR:g} %",
+        "refused",
+        value=ratio,
+        unit="of the stated speed",
+    )
 
 
-def frequency(dataset: Dataset) -> list[Finding]:
+def frequency(dataset: Dataset) -> Iterator[Finding]:
     """A centre frequency that differs from the spectrum of the water traces."""
     recorded = dataset.traces
     traces = recorded.object if recorded.water is None else recorded.water
     if dataset.center_frequency_hz is None:
-        return []
+        return
     power = np.zeros(traces.shape[-1] // 2 + 1)
     for e in range(0, len(traces), max(1, len(traces) // EMISSIONS)):
         emission = np.asarray(traces[e], dtype=np.float64)
         power += power_of(emission[np.isfinite(emission).all(axis=1)])
     if not power.any():
-        return []
+        return
     of_power = np.asarray(np.fft.rfftfreq(traces.shape[-1], 1.0 / dataset.rate_hz), dtype=np.float64)
     middle = mean_frequency(without_noise(power), of_power)
     factor = middle / dataset.center_frequency_hz
     if 1.0 / LARGEST_FREQUENCY_FACTOR <= factor <= LARGEST_FREQUENCY_FACTOR:
-        return []
-    return [
-        Finding(
-            "centre frequency",
-            f"a spectrum about {middle:.4g} Hz, {dataset.center_frequency_hz:.4g} Hz stated",
-            f"within a factor of {LARGEST_FREQUENCY_FACTOR:g}",
-            "refused",
-            value=factor,
-            unit="of the stated frequency",
-        )
-    ]
+        return
+    yield Finding(
+        "centre frequency",
+        f"a spectrum about {middle:.4g} Hz, {dataset.center_frequency_hz:.4g} Hz stated",
+        f"within a factor of {LARGEST_FREQUENCY_FACTOR:g}",
+        "refused",
+        value=factor,
+        unit="of the stated frequency",
+    )

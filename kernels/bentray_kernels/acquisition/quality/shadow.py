@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from ...arrays import Flags, Floats
@@ -36,7 +38,7 @@ REACH = 0.85
 MAX_PAIRS = 20_000
 
 
-def find_scatterer(dataset: Dataset, log_ratio: Floats) -> list[Finding]:
+def find_scatterer(dataset: Dataset, log_ratio: Floats) -> Iterator[Finding]:
     """Find the place whose chords are in shadow while those that pass beside it are not.
 
     Args:
@@ -45,10 +47,10 @@ def find_scatterer(dataset: Dataset, log_ratio: Floats) -> list[Finding]:
     """
     usable = np.isfinite(log_ratio) & (dataset.tx[:, None] != dataset.rx[None, :])
     if dataset.element_position_m.shape[1] != 2 or usable.sum() < MIN_PAIRS:
-        return []
+        return
     shadow = usable & (log_ratio - np.median(log_ratio[usable]) < SHADOWED)
     if not 0 < shadow.sum() <= MAX_SHADOW * usable.sum():
-        return []
+        return
     pairs = np.argwhere(usable)
     pairs = pairs[:: -(-len(pairs) // MAX_PAIRS)]
     dark = shadow[pairs[:, 0], pairs[:, 1]]
@@ -70,21 +72,19 @@ def find_scatterer(dataset: Dataset, log_ratio: Floats) -> list[Finding]:
     line = max((line + spacing * np.array([x, y]) for x in steps for y in steps), key=darkness)
     best = darkness(line)
     if best < INSIDE:
-        return []
+        return
     normal, height = _lines(dataset)
     crossing: Flags = shadow & (np.abs(normal @ line - height) <= width)
-    return [
-        Finding(
-            SCATTERER,
-            f"at ({1e3 * line[0]:.0f}, {1e3 * line[1]:.0f}) mm, such as a bubble: {int(crossing.sum())} "
-            "pairs through it have lost most of their amplitude",
-            "an object without gas",
-            "reported",
-            pairs=crossing,
-            value=best,
-            unit="of the chords through it",
-        )
-    ]
+    yield Finding(
+        SCATTERER,
+        f"at ({1e3 * line[0]:.0f}, {1e3 * line[1]:.0f}) mm, such as a bubble: {int(crossing.sum())} "
+        "pairs through it have lost most of their amplitude",
+        "an object without gas",
+        "reported",
+        pairs=crossing,
+        value=best,
+        unit="of the chords through it",
+    )
 
 
 def _search_grid(dataset: Dataset) -> tuple[Floats, Floats]:

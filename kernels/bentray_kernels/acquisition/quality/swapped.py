@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import combinations
 
 import numpy as np
@@ -19,7 +20,7 @@ SUSPECT_TIMES = 4.0
 BETTER = 0.4
 
 
-def find_swapped(dataset: Dataset, strongest_s: Floats, expected_s: Floats) -> list[Finding]:
+def find_swapped(dataset: Dataset, strongest_s: Floats, expected_s: Floats) -> Iterator[Finding]:
     """Find pairs of swapped channels, first receivers, then emitters.
 
     Args:
@@ -32,23 +33,19 @@ def find_swapped(dataset: Dataset, strongest_s: Floats, expected_s: Floats) -> l
         ("reception", strongest_s, expected_s),
         ("emission", strongest_s.T, expected_s.T),
     )
-    findings = []
     for role, times, expected in roles:
         element = dataset.rx if role == "reception" else dataset.tx
         for a, b, before in _exchanged(times, expected, period):
-            findings.append(
-                Finding(
-                    "swapped channels",
-                    f"elements {element[a]} and {element[b]} fit each other's places in {role}",
-                    "water times that fit an element's own position",
-                    "corrected",
-                    (int(element[a]), int(element[b])),
-                    role,
-                    value=before,
-                    unit="s, present deviation",
-                )
+            yield Finding(
+                "swapped channels",
+                f"elements {element[a]} and {element[b]} fit each other's places in {role}",
+                "water times that fit an element's own position",
+                "corrected",
+                (int(element[a]), int(element[b])),
+                role,
+                value=before,
+                unit="s, present deviation",
             )
-    return findings
 
 
 def _exchanged(times: Floats, expected: Floats, period: float) -> list[tuple[int, int, float]]:

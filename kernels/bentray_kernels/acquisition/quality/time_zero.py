@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from ...arrays import Floats
 from ..dataset import Dataset
 from ..noise import robust_deviation
-from ..reference import chord_offset
+from ..reference.water_chords import chord_offset
 from .finding import Action, Finding
 from .water_line import WaterLine
 
@@ -37,25 +39,23 @@ LARGEST_OFFSET = 0.1
 LARGEST_OFFSET_S = 5e-8
 
 
-def find_recording_shift(dataset: Dataset, line: WaterLine) -> list[Finding]:
+def find_recording_shift(dataset: Dataset, line: WaterLine) -> Iterator[Finding]:
     """Find a start of the recording that deviates by more than the delay of the pulse."""
     if abs(line.intercept_s) <= LARGEST_DELAY / dataset.frequency_hz:
-        return []
+        return
     residuals = line.residual_s[np.isfinite(line.residual_s)]
     action, more = _correctable(dataset, line.intercept_s, robust_deviation(residuals))
-    return [
-        Finding(
-            RECORDING,
-            f"water pulses differ from their straight time by {1e6 * line.intercept_s:.3g} µs{more}",
-            f"within {LARGEST_DELAY:g} periods",
-            action,
-            value=line.intercept_s,
-            unit="s",
-        )
-    ]
+    yield Finding(
+        RECORDING,
+        f"water pulses differ from their straight time by {1e6 * line.intercept_s:.3g} µs{more}",
+        f"within {LARGEST_DELAY:g} periods",
+        action,
+        value=line.intercept_s,
+        unit="s",
+    )
 
 
-def find_time_shift(dataset: Dataset, delta: Floats) -> list[Finding]:
+def find_time_shift(dataset: Dataset, delta: Floats) -> Iterator[Finding]:
     """Find a trigger offset of the object scan, which shifts all times equally.
 
     Args:
@@ -65,13 +65,13 @@ def find_time_shift(dataset: Dataset, delta: Floats) -> list[Finding]:
     outside = (chord_offset(dataset) >= OUTSIDE) & np.isfinite(delta)
     missing = delta[outside]
     if missing.size < MIN_PAIRS:
-        return []
+        return
     offset = float(np.median(missing))
     scatter = robust_deviation(missing)
     frequency = dataset.center_frequency_hz
     largest = LARGEST_OFFSET_S if frequency is None else LARGEST_OFFSET / frequency
     if abs(offset) <= max(largest, scatter):
-        return []
+        return
     action, more = _correctable(dataset, offset, scatter)
     distance = dataset.distance_m()[outside]
     farther = distance > np.median(distance)
@@ -79,17 +79,14 @@ def find_time_shift(dataset: Dataset, delta: Floats) -> list[Finding]:
         near, far = (float(np.median(missing[half])) for half in (~farther, farther))
         if abs(far - near) > max(GROWING * abs(offset), scatter, largest):
             action, more = "reported", ", but grow with the distance: the object is there, or other water"
-    return [
-        Finding(
-            OBJECT,
-            f"pairs that miss the object differ from water by {1e9 * offset:.0f} ns "
-            f"({missing.size} pairs){more}",
-            f"within {1e9 * largest:.0f} ns",
-            action,
-            value=offset,
-            unit="s",
-        )
-    ]
+    yield Finding(
+        OBJECT,
+        f"pairs that miss the object differ from water by {1e9 * offset:.0f} ns ({missing.size} pairs){more}",
+        f"within {1e9 * largest:.0f} ns",
+        action,
+        value=offset,
+        unit="s",
+    )
 
 
 def _correctable(dataset: Dataset, offset_s: float, scatter_s: float) -> tuple[Action, str]:

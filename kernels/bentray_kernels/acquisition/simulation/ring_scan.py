@@ -36,6 +36,19 @@ class Ring:
         return self.radius_m * np.column_stack((np.cos(angle), np.sin(angle)))
 
 
+def check_grid(ring: Ring, side_m: float, refinement: int, least: int) -> None:
+    """Check that a simulation is finer than inversions of its data, and that its grid holds the ring.
+
+    Raises:
+        InvalidInput: naming ``refinement``, if it is below ``least``, or ``radius_m``.
+    """
+    if refinement < least:
+        accepted = f"at least {least}: a coarser grid would be an inverse crime"
+        raise InvalidInput("refinement", refinement, accepted)
+    if ring.radius_m > 0.5 * side_m:
+        raise InvalidInput("radius_m", ring.radius_m, f"at most half the side, {0.5 * side_m:g} m")
+
+
 @dataclass(frozen=True)
 class TravelTimeScan:
     """A scan to simulate: phantom, ring and grid.
@@ -56,14 +69,7 @@ class TravelTimeScan:
     refinement: int = 4
 
     def __post_init__(self) -> None:
-        if self.refinement < 4:
-            raise InvalidInput(
-                "refinement", self.refinement, "at least 4: a coarser grid would be an inverse crime"
-            )
-        if self.ring.radius_m > 0.5 * self.side_m:
-            raise InvalidInput(
-                "radius_m", self.ring.radius_m, f"at most half the side, {0.5 * self.side_m:g} m"
-            )
+        check_grid(self.ring, self.side_m, self.refinement, 4)
 
     @property
     def fine_nodes(self) -> int:

@@ -11,7 +11,7 @@ from ...arrays import Floats
 from ...errors import InvalidInput
 from ...phantoms import VolumePhantom
 from .fine_medium import FineMedium
-from .ring_scan import Ring, TravelTimeScan
+from .ring_scan import Ring, TravelTimeScan, check_grid
 
 # Nodes of the coarse grid above the highest ring and below the lowest, for rays that leave the planes.
 AXIAL_MARGIN_NODES = 3
@@ -44,17 +44,7 @@ class VolumeScan:
         heights = np.asarray(self.z_m, dtype=np.float64)
         if heights.size == 0 or not (np.isfinite(heights).all() and (np.diff(heights) > 0.0).all()):
             raise InvalidInput("z_m", self.z_m, "one or more finite heights that rise, m")
-        if not self.three_d:
-            self.slice(0)
-            return
-        if self.refinement < 2:
-            raise InvalidInput(
-                "refinement", self.refinement, "at least 2: a coarser grid would be an inverse crime"
-            )
-        if self.ring.radius_m > 0.5 * self.side_m:
-            raise InvalidInput(
-                "radius_m", self.ring.radius_m, f"at most half the side, {0.5 * self.side_m:g} m"
-            )
+        check_grid(self.ring, self.side_m, self.refinement, 2 if self.three_d else 4)
 
     def slice(self, index: int) -> TravelTimeScan:
         """The independent scan of one plane."""

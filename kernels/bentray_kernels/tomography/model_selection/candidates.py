@@ -37,22 +37,12 @@ class CandidateGraph(ReconstructionGraph):
             for held in self._held_out
         ]
 
-    @property
-    def held_out_rms_s(self) -> float:
-        """Root mean square misfit of all held-out pairs, s."""
-        return self._misfit(len(self._held_out))[0]
+    def misfits(self, parts: int | None = None) -> tuple[float, float]:
+        """Root mean square and mean absolute misfit of the held-out pairs, s.
 
-    @property
-    def held_out_mean_s(self) -> float:
-        """Mean absolute misfit of all held-out pairs, s."""
-        return self._misfit(len(self._held_out))[1]
-
-    @property
-    def first_part_rms_s(self) -> float:
-        """Root mean square misfit of the first part, s."""
-        return self._misfit(1)[0]
-
-    def _misfit(self, parts: int) -> tuple[float, float]:
+        Args:
+            parts: how many of the parts, from the first; None: all.
+        """
         count, absolute, squares = np.sum([part.value for part in self._evaluations[:parts]], axis=0)
         return math.sqrt(squares / count), float(absolute / count)
 

@@ -139,9 +139,10 @@ def select_model(
         graphs = [graph for _, graph in tried]
         run_graphs(graphs, before, later + rest)
         before += sum(graph.total for graph in graphs)
+        misfits = [graph.misfits() for graph in graphs]
         return [
-            Candidate(changes, graph.held_out_rms_s, graph.history[-1].residual_rms_s, graph.held_out_mean_s)
-            for changes, graph in tried
+            Candidate(changes, rms, graph.history[-1].residual_rms_s, mean)
+            for (changes, graph), (rms, mean) in zip(tried, misfits, strict=True)
         ]
 
     thin = graphs_of(CANDIDATES, PARTS)
@@ -158,7 +159,7 @@ def select_model(
     others = sorted((t for t in candidates if t is not chosen), key=lambda t: t.held_out_rms_s)
     selected = final_settings(settings, chosen.settings)
     # Scattered pairs, if there are any: errors of the model are larger in views.
-    misfit = next(graph.first_part_rms_s for changes, graph in tried if changes is chosen.settings)
+    misfit = next(graph.misfits(1)[0] for changes, graph in tried if changes is chosen.settings)
     return stop_at_noise(selected, misfit, dataset), (chosen, *others), before
 
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
-from ...arrays import Flags, Floats, Ints
+from ...arrays import Ints
 from ...opencl import Session, session_or_warning
 from ...opencl.lost_device import computing_on
 from ...opencl.program import Program
@@ -63,7 +62,7 @@ def _summed(
     sums = empty_sums(pixels.inside.shape)
     samples = signals.parts.shape[-1]
     emissions, elements = len(pairs[0]), len(times.place)
-    parts, used = session.upload(signals.parts), session.upload(_bytes(signals.used))
+    parts, used = session.upload(signals.parts), session.upload(signals.used.astype(np.uint8))
     sent, back = (session.upload(np.ascontiguousarray(one, np.int32)) for one in pairs)
     places = session.upload(np.ascontiguousarray(times.place, np.float64))
     slowness = session.upload(times.slowness)
@@ -94,7 +93,7 @@ def _summed(
     for start in range(0, len(column), at_once):
         where = slice(start, start + at_once)
         m, n = column[where], row[where]
-        px, py = (_positions(pixels, axis, index) for axis, index in enumerate((m, n)))
+        px, py = (first + pixels.step * index for first, index in zip(pixels.start, (m, n), strict=True))
         count, wide = np.int32(len(m)), -(-len(m) // GROUP) * GROUP
         # Setting an argument does not keep its buffer alive: the names do.
         there = session.upload(px), session.upload(py)
@@ -109,14 +108,6 @@ def _summed(
         sums.echo[m, n] = result[:, 0] + 1j * result[:, 1]
         sums.power[m, n], sums.weight[m, n] = result[:, 2], result[:, 3]
     return sums
-
-
-def _bytes(flags: Flags) -> Any:
-    return np.ascontiguousarray(flags, np.uint8)
-
-
-def _positions(pixels: Pixels, axis: int, index: Any) -> Floats:
-    return np.asarray(pixels.start[axis] + pixels.step * index)
 
 
 def _pixels_at_once(session: Session, elements: int, emissions: int) -> int:

@@ -38,7 +38,7 @@ def with_reflection(
     dataset = source.dataset()
     speeds = _slices(result.speed)
     origin = (result.origin_m[0], result.origin_m[1])
-    graphs, envelopes, plans = [], [], []
+    graphs, plans = [], []
     for index, speed in enumerate(speeds):
         plan = plan_reflection(dataset.slice(index), settings, speed, result.spacing_m[0], origin)
         graph = ReflectionGraph((source, index), plan, source.samples, dataset.rate_hz, result.history)
@@ -46,8 +46,7 @@ def with_reflection(
         before += graph.total
         plans.append(plan)
         graphs.append(graph)
-        envelopes.append(envelope_of(graph.sums, graph.total))
-    images = in_decibels(envelopes)
+    images = in_decibels([envelope_of(graph.sums, graph.total) for graph in graphs])
     stacked = result.speed.ndim == 3
     plan, pulse = plans[0], graphs[0].pulse
     image = Reflection(

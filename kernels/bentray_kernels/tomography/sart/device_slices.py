@@ -250,16 +250,11 @@ class DeviceSlices:
             (kernel("apply"), over_images, None),
         ]
         if curved:
-            front = kernel("front", ring=local_memory(ring_bytes(ny)))
+            import pyopencl as cl
+
+            front = kernel("front", ring=cl.LocalMemory(ring_bytes(ny)))
             launches.insert(1, (front, (passes * group,), (group,)))
         return launches
-
-
-def local_memory(size_bytes: int) -> Any:
-    """An argument that reserves local memory."""
-    import pyopencl as cl
-
-    return cl.LocalMemory(size_bytes)
 
 
 def _program(group: int) -> Program:

@@ -159,7 +159,7 @@ def test_a_scatterer_is_small_against_the_dark_chords_around_it(half_waves, seen
     along = (end - start) / np.maximum(np.linalg.norm(end - start, axis=-1, keepdims=True), 1e-9)
     passing_m = np.abs(along[..., 0] * start[..., 1] - along[..., 1] * start[..., 0])
     radius_m = half_waves * 0.5 * WATER_MPS / dataset.center_frequency_hz
-    findings = find_scatterer(dataset, np.where(passing_m < radius_m, -2.0, 0.0))
+    findings = list(find_scatterer(dataset, np.where(passing_m < radius_m, -2.0, 0.0)))
     assert [finding.check for finding in findings] == ["strong scatterer"] * seen
 
 

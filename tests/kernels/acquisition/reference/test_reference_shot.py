@@ -11,8 +11,12 @@ from bentray_kernels.acquisition.picking.first_arrivals import pick
 from bentray_kernels.acquisition.quality import examine
 from bentray_kernels.acquisition.quality.estimated_water import estimate_water
 from bentray_kernels.acquisition.quality.measures import Measures
-from bentray_kernels.acquisition.reference import find_water_chords
-from bentray_kernels.acquisition.reference.water_chords import NEAREST, NEAREST_PART, chord_offset
+from bentray_kernels.acquisition.reference.water_chords import (
+    NEAREST,
+    NEAREST_PART,
+    chord_offset,
+    find_water_chords,
+)
 from bentray_kernels.errors import InvalidInput
 
 from ...straight_scans import chords_m

@@ -11,7 +11,7 @@ import math
 from bentray_kernels.acquisition.picking.gate import FREQUENCIES
 from bentray_kernels.acquisition.picking.pickers import PICKERS
 from bentray_kernels.acquisition.picking.pulse import AFTER, BEFORE, EMISSIONS
-from bentray_kernels.acquisition.reference import chords_of_emission
+from bentray_kernels.acquisition.reference.chord_pulses import chords_of_emission
 from bentray_kernels.tomography.settings import Settings
 
 from ...files.dataset.counts import Traces
