@@ -12,7 +12,7 @@ from typing import Any
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.calibration import Calibration, calibrate, water_times
 from bentray_kernels.acquisition.pulse_spectrum import PulseSpectrum
-from bentray_kernels.acquisition.quality import Examined, Finding, Report, examine_slices
+from bentray_kernels.acquisition.quality import Examined, Finding, Report, examine
 from bentray_kernels.acquisition.quality.correction import apply
 from bentray_kernels.acquisition.quality.water_speed import WATER_SPEED
 from bentray_kernels.acquisition.water import temperature_from_speed
@@ -126,7 +126,7 @@ def _examined(
     draw: bool = True,
     max_left_out: float,
 ) -> Quality:
-    examined = examine_slices(whole, _slices(path, whole), picker, progress, max_left_out)
+    examined = examine(whole, picker, progress, max_left_out, _slices(path, whole))
     if spectrum is not None:
         findings = (_estimated_frequency(spectrum), *examined.report.findings)
         examined = replace(examined, report=replace(examined.report, findings=findings))

@@ -8,37 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from ...arrays import Flags, Ints
-from ...errors import InvalidInput
 from ..dataset import OVER_PAIRS, Dataset
 from ..emissions import invert_polarity, reorder_channels
 from ..waveform import ARRAYS, Waveform
-from .finding import Finding, Report
+from .finding import Finding
 from .time_zero import OBJECT, RECORDING
 from .water_speed import WATER_SPEED
-
-
-def corrected(dataset: Dataset, report: Report) -> Dataset:
-    """The dataset with the report's corrections: dead pairs masked, channels exchanged, polarity and offsets
-    corrected.
-
-    Args:
-        dataset: as examined.
-        report: of the examination.
-
-    Raises:
-        InvalidInput: for a rejected scan, with the finding.
-    """
-    refusal = report.refusal
-    if refusal is not None:
-        raise InvalidInput(refusal.check, refusal.found, refusal.accepted)
-    if not report.findings:
-        return dataset
-    if dataset.slice_z_m is None:
-        return apply(dataset, report.findings)
-    slices = [
-        apply(dataset.slice(k), [f for f in report.findings if f.slice == k]) for k in range(dataset.slices)
-    ]
-    return stacked(dataset, slices)
 
 
 def apply(dataset: Dataset, findings: Iterable[Finding]) -> Dataset:

@@ -54,40 +54,22 @@ def examine(
     picker: str = DEFAULT_PICKER,
     progress: Callable[[int, int], None] | None = None,
     max_left_out: float = MAX_LEFT_OUT,
+    slices: Iterable[Dataset] | None = None,
 ) -> Examined:
     """Check a scan, correct what can be corrected, pick its times where it has none, and check those.
 
     Every check is applied to the data as corrected by the previous ones.
 
     Args:
-        dataset: with traces or travel times.
+        dataset: with traces or travel times; without traces if they are only in ``slices``.
         picker: method for missing times.
         progress: called with (emissions done, total); emissions count once for every pass over their traces.
         max_left_out: share of the pairs beyond which a scan is refused, 0 to 1.
+        slices: all slices in order; each is released before the next one; traces may be ``Emissions``. None:
+            those of ``dataset``.
 
     Raises:
         InvalidInput: for an unknown picker, and a share outside 0 to 1.
-    """
-    slices = (dataset.slice(k) for k in range(dataset.slices))
-    return examine_slices(dataset, slices, picker, progress, max_left_out)
-
-
-def examine_slices(
-    dataset: Dataset,
-    slices: Iterable[Dataset],
-    picker: str = DEFAULT_PICKER,
-    progress: Callable[[int, int], None] | None = None,
-    max_left_out: float = MAX_LEFT_OUT,
-) -> Examined:
-    """Like ``examine``, with slices from an iterator.
-
-    Args:
-        dataset: the scan; without traces if they are only in ``slices``.
-        slices: all slices in order; each is released before the next one; traces may be ``Emissions``.
-        picker, progress, max_left_out: as ``examine`` takes them.
-
-    Raises:
-        InvalidInput: as ``examine``.
     """
     SHARE.check("max_left_out", max_left_out)
     findings = find_impossible(dataset.impossible_times)
@@ -95,7 +77,7 @@ def examine_slices(
     counted: list[Pairs] = []
     checked: tuple[str, ...] = ()
     numbers = count(1)
-    for k, slice_data in enumerate(slices):
+    for k, slice_data in enumerate(slices or map(dataset.slice, range(dataset.slices))):
         total = dataset.slices * len(dataset.tx) * _times_read(slice_data)
 
         def step(total: int = total) -> None:

@@ -64,7 +64,6 @@ class ReferenceShot:
             stated speed, weighted by their variances.
         speed_sigma_mps: its standard deviation: from the scatter of the arrivals, for the distances that the
             delays of elements leave, and half the difference from the group speed, which water does not have.
-        scatter_s: robust standard deviation of the arrivals.
         noise: standard deviation of the noise in the traces. Pickers find the onset of a noiseless pulse
             earlier than that of a recorded one.
     """
@@ -80,7 +79,6 @@ class ReferenceShot:
     chords: int
     speed_mps: float
     speed_sigma_mps: float
-    scatter_s: float
     noise: float
 
     def applied(self, dataset: Dataset) -> Dataset:
@@ -290,7 +288,6 @@ class _Fit:
             chords=int(self.used.sum()),
             speed_mps=speed,
             speed_sigma_mps=sigma,
-            scatter_s=robust_deviation(self.lag_s[self.used]),
             noise=float(np.median(finite)) if finite.size else 0.0,
         )
 

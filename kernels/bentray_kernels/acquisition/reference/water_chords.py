@@ -52,16 +52,12 @@ class WaterChords:
         pairs: (ntx, nrx), chords that miss the object.
         speed_mps: apparent speed of the coupling medium.
         delay_s: of the arrivals, with that of the pulse and of the recording's time zero.
-        scatter_s: robust standard deviation of the arrivals from the line.
-        speed_sigma_mps: standard deviation of the speed, from the scatter.
         emission_delay_s, reception_delay_s: (ntx,), (nrx,), known delays of elements, s; None: 0.
     """
 
     pairs: Flags
     speed_mps: float
     delay_s: float
-    scatter_s: float
-    speed_sigma_mps: float
     emission_delay_s: Floats | None = None
     reception_delay_s: Floats | None = None
 
@@ -127,9 +123,7 @@ def find_water_chords(dataset: Dataset, arrival_s: Floats, tolerance: float = MI
         raise _refusal(agreeing.size)
     chosen = np.zeros(distance.size, dtype=bool)
     chosen[pairs[agreeing]] = True
-    spread = robust_deviation(y[agreeing] - slowness * x[agreeing])
-    sigma = spread / (np.std(x[agreeing]) * np.sqrt(agreeing.size)) * speed**2
-    return WaterChords(chosen.reshape(distance.shape), speed, delay, spread, float(sigma))
+    return WaterChords(chosen.reshape(distance.shape), speed, delay)
 
 
 def chord_offset(dataset: Dataset) -> Floats:

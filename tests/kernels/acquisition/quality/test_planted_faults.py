@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from bentray_kernels.acquisition import Dataset, Waveform
 from bentray_kernels.acquisition.calibration import calibrate, water_times
-from bentray_kernels.acquisition.quality import Examined, Finding, corrected, examine
+from bentray_kernels.acquisition.quality import Examined, Finding, examine
 from bentray_kernels.acquisition.quality.chords import _log_ratio
+from bentray_kernels.acquisition.quality.correction import apply
 from bentray_kernels.acquisition.quality.element_errors import _robust_fit
 from bentray_kernels.acquisition.quality.polarity import MIN_PAIRS, _majority
 from bentray_kernels.acquisition.quality.swapped import _exchanged
@@ -194,7 +195,7 @@ def test_an_eccentricity_of_a_millimetre_is_named_survived_and_calibrated(sought
     delta = examined.picked.differential_tof()
     assert np.isfinite(delta[np.isfinite(sought)]).mean() > 0.98
     assert np.nanmax(np.abs(delta - sought)) < 1e-7
-    put_right = corrected(dataset, examined.report)
+    put_right = apply(dataset, examined.report.findings)
     fitted = calibrate(put_right, water_times(put_right)).element_position_m
     assert np.median(np.linalg.norm(fitted - true, axis=1)) < 0.2 * np.median(
         np.linalg.norm(drawn - true, axis=1)
