@@ -1,16 +1,17 @@
-"""The synchronous client: upload a scan, run a job, download the result."""
+"""The synchronous and the asynchronous client: upload a scan, run a job, download the result."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import AsyncExitStack, ExitStack, asynccontextmanager, contextmanager
 from typing import Any, Self, TypeVar
 
+import anyio
 import httpx
-from tenacity import Retrying
+from tenacity import AsyncRetrying, Retrying
 
-from ..web.outbound import Transport
+from ..web.outbound import AsyncTransport, Transport
 from .connection import Connection, saving
 from .errors import ClientError, from_response, no_answer
 from .operations import Operations
@@ -94,3 +95,89 @@ class Client(Operations):
                 yield response
         except httpx.TransportError as error:
             raise no_answer(self.url, error) from error
+
+
+class AsyncClient(Operations):
+    """Like :class:`Client`; use it with ``async with``, and await its methods."""
+
+    def _open(self) -> None:
+        self._http = httpx.AsyncClient(**self._options, transport=AsyncTransport(retries=2))
+        self._bucket = httpx.AsyncClient(timeout=self._options["timeout"], transport=AsyncTransport())
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self.close()
+
+    async def close(self) -> None:
+        """Close the connections."""
+        await self._http.aclose()
+        await self._bucket.aclose()
+
+    async def _run(self, flow: Flow[T]) -> T:
+        advance: Callable[[Any], Step] = flow.send
+        outcome: Any = None
+        async with AsyncExitStack() as streams:
+            listening: dict[str, AsyncIterator[str]] = {}
+            while True:
+                try:
+                    step = advance(outcome)
+                except StopIteration as end:
+                    return end.value  # type: ignore[no-any-return]
+                try:
+                    retrying = AsyncRetrying(sleep=anyio.sleep, **self._retries.options(step))
+                    advance, outcome = flow.send, await retrying(self._do, step, streams, listening)
+                except ClientError as error:
+                    advance, outcome = flow.throw, error
+
+    async def _do(self, step: Step, streams: AsyncExitStack, listening: dict[str, AsyncIterator[str]]) -> Any:
+        if isinstance(step, PauseStep):
+            return await anyio.sleep(step.seconds)
+        if isinstance(step, RequestStep):
+            content = None if step.body is None else _as_async(step.body())
+            async with self._respond(step.method, step.path, content=content, **step.options) as response:
+                await response.aread()
+                return response
+        if isinstance(step, DownloadStep):
+            async with self._respond("GET", step.path, **step.options) as response:
+                with saving(step, response) as save:
+                    async for chunk in response.aiter_bytes(CHUNK_BYTES):
+                        await anyio.to_thread.run_sync(save, chunk)
+            return None
+        return await self._listen(step, streams, listening)
+
+    async def _listen(
+        self, step: EventStep, streams: AsyncExitStack, listening: dict[str, AsyncIterator[str]]
+    ) -> str | None:
+        if step.path not in listening:
+            response = self._respond("GET", step.path, timeout=step.seconds)
+            listening[step.path] = (await streams.enter_async_context(response)).aiter_lines()
+        try:
+            line = await anext(listening[step.path], None)
+        except httpx.TransportError as error:
+            del listening[step.path]
+            raise no_answer(self.url, error) from error
+        if line is None:
+            del listening[step.path]
+        return line
+
+    def _of(self, path: str) -> httpx.AsyncClient:
+        return self._http if path.startswith("/") else self._bucket
+
+    @asynccontextmanager
+    async def _respond(self, method: str, path: str, **request: Any) -> AsyncIterator[httpx.Response]:
+        try:
+            async with self._of(path).stream(method, path, **request) as response:
+                if not response.is_success:
+                    await response.aread()
+                    raise from_response(response)
+                yield response
+        except httpx.TransportError as error:
+            raise no_answer(self.url, error) from error
+
+
+async def _as_async(chunks: Iterator[bytes]) -> AsyncIterator[bytes]:
+    """Read the chunks of a file in a thread."""
+    while (chunk := await anyio.to_thread.run_sync(next, chunks, None)) is not None:
+        yield chunk

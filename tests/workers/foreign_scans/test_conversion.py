@@ -17,7 +17,7 @@ from bentray_kernels.acquisition import speed_from_temperature
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.dataset import read_dataset, write_dataset
 from bentray_workers.foreign_scans import convert_dataset
-from bentray_workers.foreign_scans.matlab5 import Matlab5
+from bentray_workers.foreign_scans.matlab import Matlab5
 
 from ...kernels.acquisition.traces import scan
 from .scans import (

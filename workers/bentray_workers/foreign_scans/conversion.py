@@ -16,7 +16,7 @@ from ..files.zip_checks import plain_name
 from . import kit, kwave, layouts, openusct, zea
 from .arrays import Arrays
 from .layouts import named_layout
-from .matlab73 import Matlab73
+from .matlab import Matlab73
 from .open_scan import OpenScan, open_scan
 from .scan_metadata import POSITION, ArraysWithMetadata, ScanMetadata
 from .scan_reader import Layout, ScanReader

@@ -25,7 +25,7 @@ from ..files.damage import rejecting_damage
 from ..files.zip_checks import WHOLE, check_zip, member_file, naming
 from .arrays import StreamedScan, Traces, read_small
 from .kit_signals import RATE_HZ, UNDERSAMPLING, compress, decode_float16, reconstruct_undersampled
-from .matlab5 import Matlab5
+from .matlab import Matlab5
 from .open_scan import OpenScan
 from .scan_reader import ScanReader, Variable
 

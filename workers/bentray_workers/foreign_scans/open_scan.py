@@ -17,9 +17,9 @@ from ..files import npz
 from ..files.damage import first_bytes, rejecting_damage
 from ..files.dataset.read import FORMAT
 from ..files.hdf5_reading import SIGNATURE, Reader, opened
-from . import matlab5
+from . import matlab
 from .arrays import Arrays
-from .matlab73 import Matlab73
+from .matlab import Matlab73
 
 # HDF5 may begin after a user block; that of MATLAB 7.3 has 512 bytes.
 USER_BLOCK = 512
@@ -121,8 +121,8 @@ def open_scan(path: Path, scratch: Path) -> Iterator[OpenScan]:
             start = file.read(USER_BLOCK + len(SIGNATURE))
     except OSError as error:
         raise InvalidInput("file", f"{path.name}: {error.strerror}", "a scan") from None
-    if start.startswith(matlab5.START):
-        yield OpenScan(scratch, matlab=matlab5.Matlab5(path))
+    if start.startswith(matlab.START):
+        yield OpenScan(scratch, matlab=matlab.Matlab5(path))
     elif start.startswith(npz.START):
         with rejecting_damage("file", npz.WHOLE):
             archive = zipfile.ZipFile(path)

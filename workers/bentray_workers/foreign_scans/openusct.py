@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from bentray_kernels.errors import InvalidInput
 
 from .arrays import StreamedScan, Traces
-from .matlab73 import rows_of
+from .matlab import rows_of
 from .open_scan import OpenScan
 from .scan_reader import ScanReader, Variable
 

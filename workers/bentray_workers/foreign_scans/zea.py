@@ -20,7 +20,7 @@ from bentray_kernels.requests.limits import check_size
 from ..files.damage import ACCEPTED
 from ..files.hdf5_reading import Reader
 from .arrays import StreamedScan, Traces
-from .matlab73 import rows_of
+from .matlab import rows_of
 from .open_scan import OpenScan
 from .scan_reader import ScanReader, Variable
 

@@ -1,6 +1,6 @@
-"""MATLAB files of version 5 (6, 7), read by SciPy: plain arrays of numbers.
+"""MATLAB files: of version 5 (6, 7), read by SciPy, and 7.3, which is HDF5; plain arrays of numbers.
 
-Cells, structures, objects, functions and opaque data are named but never read.
+Cells, structures, objects, functions and opaque data of version 5 are named but never read.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
+import h5py
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,9 +21,12 @@ from bentray_kernels.errors import InvalidInput
 
 from ..files.bounded_reading import check_declared, check_row
 from ..files.damage import ACCEPTED, rejecting_damage
+from ..files.dataset.counts import BLOCK_BYTES
+from ..files.hdf5_reading import Reader, rejecting_hdf5_damage
 
 START = b"MATLAB 5.0 MAT-file"
 
+PLAIN = "a plain array of real numbers"
 # Types of the classes of numeric arrays, and other classes in words.
 NUMBERS = {
     name: np.dtype(name.replace("single", "float32").replace("double", "float64"))
@@ -79,9 +83,9 @@ class Matlab5:
             return None
         shape, kind = self._variables[name]
         if kind not in NUMBERS or name not in self._plain:
-            raise InvalidInput(name, OTHERS.get(kind, kind), "a plain array of real numbers")
+            raise InvalidInput(name, OTHERS.get(kind, kind), PLAIN)
         if self._plain[name]:
-            accepted = f"a plain array of real numbers; {ACCEPTED}"
+            accepted = f"{PLAIN}; {ACCEPTED}"
             raise InvalidInput(name, COMPLEX_NUMBERS, accepted)
         dtype = NUMBERS[kind]
         check_declared(name, shape[::-1], dtype, self._path.stat().st_size, PACKING)
@@ -151,3 +155,59 @@ def _rejecting_damage(name: str) -> Iterator[None]:
     with rejecting_damage(name, "a whole MATLAB file"), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         yield
+
+
+class Matlab73:
+    """The arrays of one file; see ``Arrays``. MATLAB stores them with reversed axes.
+
+    Args:
+        reader: of the file.
+        is_matlab: whether the file has the header of MATLAB.
+    """
+
+    reversed_axes = True
+
+    def __init__(self, reader: Reader, *, is_matlab: bool = True) -> None:
+        self._reader = reader
+        self.kind = "a MATLAB 7.3 file" if is_matlab else "an HDF5 file"
+
+    def names(self) -> tuple[str, ...]:
+        return self._reader.names()
+
+    def declared(self, name: str) -> tuple[tuple[int, ...], np.dtype[Any]] | None:
+        stored = self._reader.checked(name, "iuf", PLAIN) if self._reader.contains(name) else None
+        if stored is None:
+            return None
+        # MATLAB marks empty arrays and stores their shape as numbers.
+        if self._reader.attribute(name, "MATLAB_empty") is not None:
+            raise InvalidInput(name, "an empty array", PLAIN)
+        return stored.shape, stored.dtype
+
+    def whole(self, name: str) -> NDArray[Any]:
+        return self._reader.required(name, "iuf", PLAIN)
+
+    def rows(self, name: str) -> Iterator[NDArray[Any]]:
+        stored = self._reader.checked(name, "iuf", PLAIN)
+        if stored is None:
+            raise InvalidInput(name, "nothing", PLAIN)
+        check_row(name, stored.shape, stored.dtype)
+        yield from rows_of(stored, name)
+
+
+def rows_of(stored: h5py.Dataset, name: str, before: tuple[int, ...] = ()) -> Iterator[NDArray[Any]]:
+    """The rows of an array along one axis, in blocks, so that a chunk is decompressed once or few times.
+
+    Args:
+        stored: checked array, whose rows fit into the memory.
+        name: for errors.
+        before: indices of the axes before that of the rows.
+    """
+    axis = len(before)
+    count = stored.shape[axis]
+    row_bytes = max(1, stored.dtype.itemsize * int(np.prod(stored.shape[axis + 1 :], dtype=np.int64)))
+    chunk = 1 if stored.chunks is None else stored.chunks[axis]
+    block = max(1, min(chunk, BLOCK_BYTES // row_bytes))
+    for begin in range(0, count, block):
+        with rejecting_hdf5_damage(name, PLAIN):
+            rows = np.asarray(stored[(*before, slice(begin, begin + block))])
+        yield from rows
