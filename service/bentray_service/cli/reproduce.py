@@ -73,15 +73,13 @@ def compared(before: Reconstruction, after: Reconstruction) -> dict[str, Any]:
     from bentray_workers.files.quantities import IMAGES, REFLECTION
 
     differences: dict[str, Any] = {}
-    arrays: list[tuple[str, Any, Any]] = [
-        (place, getattr(before, name), getattr(after, name))
-        for name, place in {**IMAGES, "residuals": "residuals"}.items()
+    held: list[dict[str, Any]] = [
+        {place: getattr(result, name) for name, place in {**IMAGES, "residuals": "residuals"}.items()}
+        | {REFLECTION: result.reflection and result.reflection.db}
+        for result in (before, after)
     ]
-    old_echoes, new_echoes = (
-        None if one.reflection is None else one.reflection.db for one in (before, after)
-    )
-    arrays.append((REFLECTION, old_echoes, new_echoes))
-    for place, old, new in arrays:
+    for place, old in held[0].items():
+        new = held[1][place]
         if old is None and new is None:
             continue
         if old is None or new is None:

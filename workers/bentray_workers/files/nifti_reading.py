@@ -6,7 +6,6 @@ import logging
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
@@ -75,8 +74,9 @@ def nifti_image(file: Any, check: ShapeCheck = any_shape, least: int = 2) -> Pos
         if (slope or 1.0, intercept or 0.0) != (1.0, 0.0):
             with np.errstate(over="ignore", invalid="ignore"):
                 values = values * np.float32(slope) + np.float32(intercept)
+        title = bytes(header["descrip"].item()).decode("utf-8", "replace")
         affine[:3] *= UNITS_M["mm" if unit == "unknown" else unit]
-        return PositionedImage(*reorient(values, affine, "affine"), _text(header["descrip"]))
+        return PositionedImage(*reorient(values, affine, "affine"), title)
 
 
 def _check_numbers(header: Any) -> None:
@@ -97,7 +97,3 @@ def _affine(header: Any) -> Floats:
         # Nibabel would flip x, as another format does.
         return np.diag([*np.asarray(header["pixdim"][1:4], dtype=np.float64), 1.0])
     return np.asarray(header.get_best_affine(), dtype=np.float64)
-
-
-def _text(field: NDArray[Any]) -> str:
-    return bytes(field.item()).decode("utf-8", "replace")

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,12 +72,17 @@ def write_header_and_values(path: Path, header: str, values: NDArray[Any]) -> No
     Raises:
         OSError: where the folder cannot be written to or the disk is full.
     """
-    stored = np.asarray(values, dtype=values.dtype.newbyteorder("<"))
     with atomic_replace(path) as partial, partial.open("wb") as file:
         file.write(header.encode())
-        # One slice at a time, since transposing the whole would double the memory.
-        for k in range(stored.shape[-1]):
-            file.write(stored[..., k].tobytes(order="F"))
+        write_values(file, values)
+
+
+def write_values(file: IO[bytes], values: NDArray[Any]) -> None:
+    """Write little-endian values (nx, ny[, nz]) with x varying fastest."""
+    stored = np.asarray(values, dtype=values.dtype.newbyteorder("<"))
+    # One slice at a time, since transposing the whole would double the memory.
+    for k in range(stored.shape[-1]):
+        file.write(stored[..., k].tobytes(order="F"))
 
 
 def type_name(values: NDArray[Any], names: Mapping[str, str]) -> str:

@@ -7,10 +7,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
-import numpy as np
-
 from ..atomic import atomic_replace
-from .content import Content
+from .content import Content, write_values
 
 TYPES = {"u1": "UInt8", "u2": "UInt16", "f4": "Float32", "f8": "Float64"}
 SIZE = struct.Struct("<Q")
@@ -50,10 +48,7 @@ def write(path: Path, content: Content) -> None:
         file.write(header.encode())
         for image in images.values():
             file.write(SIZE.pack(image.nbytes))
-            stored = np.asarray(image, dtype=image.dtype.newbyteorder("<"))
-            # x varies fastest; one slice at a time, since transposing the whole would double the memory.
-            for k in range(stored.shape[-1] if stored.ndim == 3 else 1):
-                file.write((stored[..., k] if stored.ndim == 3 else stored).tobytes(order="F"))
+            write_values(file, image)
         file.write(b"</AppendedData>\n</VTKFile>\n")
 
 
