@@ -214,5 +214,5 @@ def plan_job(job_request: JobRequest, context: Context) -> EstimateRecord:
         plan=None if new.plan is None else PlanRecord.model_validate(new.plan),
         rough=found.rough,
         **asdict(found),
-        ahead=jobs.next_place(context.tenant),
+        ahead=jobs.queue_position(context.tenant),
     )

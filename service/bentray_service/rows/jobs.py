@@ -139,14 +139,10 @@ class Jobs(NamedTable[JobRow]):
         """
         if job.state != "queued":
             return None
-        return self._queue_position(job.tenant, job.number)
+        return self.queue_position(job.tenant, job.number)
 
-    def next_place(self, tenant: Tenant) -> int:
-        """The ``place`` of a job that this tenant would submit now."""
-        return self._queue_position(tenant, None)
-
-    def _queue_position(self, tenant: Tenant, number: int | None) -> int:
-        """The place of a queued job of a tenant, or without a number of one after all others."""
+    def queue_position(self, tenant: Tenant, number: int | None = None) -> int:
+        """The place of a queued job of a tenant by its number; None: of one that it would submit now."""
         with self._database.read() as session:
             account = account_of(session, tenant)
             turns = turns_of(session, account)

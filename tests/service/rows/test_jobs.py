@@ -78,7 +78,7 @@ def test_the_next_place_is_that_of_the_job_submitted_next(jobs, queue, dataset):
     chance = random.Random(4)
     for _ in range(30):
         tenant = chance.choice(tenants)
-        before = jobs.next_place(tenant)
+        before = jobs.queue_position(tenant)
         assert jobs.place(jobs.add(tenant, NewJob("reconstruction", {}, dataset))) == before
         if chance.random() < 0.4:
             queue.claim()
