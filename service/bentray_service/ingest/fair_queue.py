@@ -62,10 +62,6 @@ class FairQueue:
         for thread in self._threads:
             thread.start()
 
-    def alive(self) -> bool:
-        """Whether all threads are alive."""
-        return all(thread.is_alive() for thread in self._threads)
-
     def stop(self) -> None:
         """Cancel queued functions, and end the threads after the running ones."""
         with self._changed:

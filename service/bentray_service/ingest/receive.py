@@ -278,7 +278,8 @@ async def append(
         TooLarge: when the body exceeds ``length``.
         WrongChecksum, StorageFull: as their names say.
     """
-    digest = _hasher(checksum.algorithm) if checksum is not None else None
+    # SHA-1 and MD5 detect transmission errors; they have no security purpose.
+    digest = hashlib.new(checksum.algorithm, usedforsecurity=False) if checksum is not None else None
     await run_in_threadpool(_begin, path, offset if checksum is not None else None)
     file = await run_in_threadpool(path.open, "r+b", 0)
     try:
@@ -346,8 +347,3 @@ def _unverified_from(path: Path) -> float:
 
 def _mark(path: Path) -> Path:
     return path.with_name(f"{path.name}.unverified")
-
-
-def _hasher(algorithm: str) -> hashlib._Hash:
-    # SHA-1 and MD5 detect transmission errors; they have no security purpose.
-    return hashlib.new(algorithm, usedforsecurity=False)
