@@ -7,7 +7,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import TYPE_CHECKING, Any, Protocol
 
 from rich.console import Console
@@ -38,8 +38,7 @@ class Step(Protocol):
     def __call__(self, done: int, total: int, note: str = "") -> None: ...
 
 
-@contextmanager
-def progress_bar(description: str, *, shown: bool = True) -> Iterator[Step]:
+def progress_bar(description: str, *, shown: bool = True) -> AbstractContextManager[Step]:
     """Show a progress bar in the cell of a notebook or on a terminal, else lines; both are on stderr.
 
     While this process compiles kernels, their count takes the place of that of the work.
@@ -48,22 +47,15 @@ def progress_bar(description: str, *, shown: bool = True) -> Iterator[Step]:
         description: beside the bar.
         shown: false: no bar.
 
-    Yields:
-        a function to update it.
+    Returns:
+        A context manager with a function to update it.
     """
-    notebook = _notebook() if shown else None
-    console = Console(stderr=True)
     if not shown:
-        yield lambda done, total, note="": None
-    elif notebook is not None:
-        with _in_notebook(description, notebook) as step:
-            yield step
-    elif console.is_terminal:
-        with _on_terminal(description, console) as step:
-            yield step
-    else:
-        with _in_lines(description) as step:
-            yield step
+        return nullcontext(lambda done, total, note="": None)
+    if (notebook := _notebook()) is not None:
+        return _in_notebook(description, notebook)
+    console = Console(stderr=True)
+    return _on_terminal(description, console) if console.is_terminal else _in_lines(description)
 
 
 def phase_note(phase: str, rms_s: float | None = None) -> str:

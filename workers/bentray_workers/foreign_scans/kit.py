@@ -141,12 +141,10 @@ class Measurement:
         first = np.cumsum([0, *map(len, receivers), *(map(len, emitters) if apart else ())])
         self._first = first
         offset = len(receivers) if apart else 0
-        self.tx = np.array(
-            [
-                _element(first, offset, emission.tas, emission.emitter, emitters, emission.name)
-                for emission in self._emissions
-            ]
-        )
+        for name, tas, emitter in self._emissions:
+            if not 1 <= tas <= len(emitters) or not 1 <= emitter <= len(emitters[tas - 1]):
+                raise InvalidInput(name, f"emitter {emitter} of TAS {tas}", "an emitter of the geometry")
+        self.tx = np.array([first[offset + tas - 1] + emitter - 1 for _, tas, emitter in self._emissions])
         self._receivers = receivers
         columns = [self._columns(emission) for emission in self._emissions]
         self.rx = np.unique(np.concatenate([elements for elements, _ in columns]))
@@ -300,14 +298,6 @@ def _positions(elements: NDArray[Any], name: str, file: str) -> list[NDArray[Any
     if any(of_tas.dtype.kind != "f" or of_tas.ndim != 2 or of_tas.shape[1] != 3 for of_tas in positions):
         raise InvalidInput(f"{file}: TASElements.{name}", "no positions", "(n, 3) numbers in m for every TAS")
     return [of_tas.astype(np.float64) for of_tas in positions]
-
-
-def _element(
-    first: NDArray[Any], offset: int, tas: int, emitter: int, positions: list[NDArray[Any]], name: str
-) -> int:
-    if not 1 <= tas <= len(positions) or not 1 <= emitter <= len(positions[tas - 1]):
-        raise InvalidInput(name, f"emitter {emitter} of TAS {tas}", "an emitter of the geometry")
-    return int(first[offset + tas - 1]) + emitter - 1
 
 
 def _number(variables: dict[str, Any], name: str) -> float | None:

@@ -60,11 +60,11 @@ UNITS: Mapping[str, tuple[str, float]] = {
 VARIABLE = re.compile(r"[\w./ -]{1,200}")
 # Speeds of water that contradict each other differ by more.
 AGREED_MPS = 15.0
-# Options of numbers by their places in the upload format.
+# Options of numbers by their places in the upload format: name and range.
 NUMBERS = {
-    "water/temperature_c": "temperature",
-    "water/sound_speed_mps": "sound speed",
-    "acquisition/center_frequency_hz": "frequency",
+    "water/temperature_c": ("temperature", TEMPERATURE_C),
+    "water/sound_speed_mps": ("sound speed", SPEED_MPS),
+    "acquisition/center_frequency_hz": ("frequency", FREQUENCY_HZ),
 }
 POSITION = "geometry/element_position_m"
 INDICES = ("acquisition/tx", "acquisition/rx")
@@ -104,18 +104,18 @@ class ScanMetadata:
         Raises:
             InvalidInput: naming the option, its value and the accepted values.
         """
-        numbers = dict(zip(NUMBERS, (temperature_c, sound_speed_mps, frequency_hz), strict=True))
-        stated = {path: value for path, value in numbers.items() if value is not None}
-        for path, within in zip(NUMBERS, (TEMPERATURE_C, SPEED_MPS, FREQUENCY_HZ), strict=True):
-            if path in stated:
-                within.check(NUMBERS[path], stated[path])
-        stated = {path: float(value) for path, value in stated.items()}
+        stated = {}
+        for path, value in zip(NUMBERS, (temperature_c, sound_speed_mps, frequency_hz), strict=True):
+            if value is not None:
+                name, within = NUMBERS[path]
+                within.check(name, value)
+                stated[path] = float(value)
         return cls(_variables(map), _factors(unit), stated)
 
     def words(self) -> str:
         """The names of what is stated, for errors."""
         named = {"map": self.variables, "unit": self.factors}
-        numbers = (NUMBERS[path] for path in self.numbers)
+        numbers = (NUMBERS[path][0] for path in self.numbers)
         return ", ".join([*(name for name, values in named.items() if values), *numbers])
 
     def __bool__(self) -> bool:
