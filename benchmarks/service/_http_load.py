@@ -1,19 +1,52 @@
-"""HTTP load over loopback: a number of client threads, each with one connection, for a fixed time."""
+"""A service for a benchmark, and HTTP load over loopback: client threads with one connection each."""
 
 import http.client
+import os
+import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
 from urllib.parse import urlsplit
 
 import numpy as np
+
+from bentray_service.cli.service_process import running_service
 
 TIMEOUT_S = 60.0
 
 # One request on a connection, the number of the request, and whether it was answered well.
 Call = Callable[[http.client.HTTPConnection, int], bool]
+
+NONE: Mapping[str, str] = {}
+
+
+@contextmanager
+def served(settings: Mapping[str, str] = NONE) -> Iterator[tuple[str, Path]]:
+    """Address of a new service with these environment variables, and a folder for files."""
+    with tempfile.TemporaryDirectory() as name, patch.dict(os.environ, settings):
+        folder = Path(name)
+        with running_service(folder / "data", folder / "log") as url:
+            yield url, folder
+
+
+@contextmanager
+def beside(works: Iterable[Callable[[threading.Event], object]]) -> Iterator[list[threading.Thread]]:
+    """Run each in a thread of its own within the block; it returns once the event is set."""
+    stop = threading.Event()
+    threads = [threading.Thread(target=work, args=(stop,)) for work in works]
+    for thread in threads:
+        thread.start()
+    try:
+        yield threads
+    finally:
+        stop.set()
+        for thread in threads:
+            thread.join()
 
 
 @dataclass
@@ -49,11 +82,11 @@ def connect(url: str) -> http.client.HTTPConnection:
 @contextmanager
 def calling(url: str, callers: int, call: Call, pause_s: float = 0.0) -> Iterator[Calls]:
     """Call all the time that the block takes; what is yielded is complete after it."""
-    calls, stop, begun = Calls(), threading.Event(), time.perf_counter()
-    lock = threading.Lock()
+    calls, begun = Calls(), time.perf_counter()
+    lock, numbers = threading.Lock(), iter(range(callers))
 
-    def work(first: int) -> None:
-        connection, number = connect(url), first
+    def work(stop: threading.Event) -> None:
+        connection, number = connect(url), next(numbers)
         while not stop.is_set():
             at = time.perf_counter()
             try:
@@ -69,15 +102,10 @@ def calling(url: str, callers: int, call: Call, pause_s: float = 0.0) -> Iterato
             stop.wait(pause_s)
         connection.close()
 
-    threads = [threading.Thread(target=work, args=(k,)) for k in range(callers)]
-    for thread in threads:
-        thread.start()
     try:
-        yield calls
+        with beside([work] * callers):
+            yield calls
     finally:
-        stop.set()
-        for thread in threads:
-            thread.join()
         calls.lasted_s = time.perf_counter() - begun
 
 
@@ -88,9 +116,16 @@ def load(url: str, callers: int, call: Call, seconds: float, pause_s: float = 0.
     return calls
 
 
-def got(connection: http.client.HTTPConnection, path: str) -> bool:
-    """One GET."""
-    connection.request("GET", path)
+def asked(
+    connection: http.client.HTTPConnection, method: str, path: str, *content: Any
+) -> http.client.HTTPResponse:
+    """The answer, read to its end, to a request with a body and headers, if given."""
+    connection.request(method, path, *content)
     answer = connection.getresponse()
     answer.read()
-    return answer.status == 200
+    return answer
+
+
+def got(connection: http.client.HTTPConnection, path: str) -> bool:
+    """One GET."""
+    return asked(connection, "GET", path).status == 200

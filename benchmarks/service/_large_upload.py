@@ -1,19 +1,20 @@
 """Upload of a scan of many gigabytes by tus, and peak memory of the service and of the reading process."""
 
-import http.client
 import shutil
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from http.client import HTTPConnection, HTTPResponse
 from pathlib import Path
+from typing import BinaryIO
 
 import h5py
 import numpy as np
 import psutil
 
-from ._http_load import connect
+from ._http_load import asked, beside, connect
 
 ELEMENTS = 256
 SAMPLE_S = 0.1
@@ -53,9 +54,8 @@ class Sent:
 @contextmanager
 def watched(process: psutil.Process, most: dict[str, int]) -> Iterator[None]:
     """Keep the most memory that the service and its reader are seen to have."""
-    stop = threading.Event()
 
-    def look() -> None:
+    def look(stop: threading.Event) -> None:
         while not stop.wait(SAMPLE_S):
             most["service"] = max(most["service"], process.memory_info().rss)
             for child in process.children(recursive=True):
@@ -65,13 +65,8 @@ def watched(process: psutil.Process, most: dict[str, int]) -> Iterator[None]:
                 except psutil.Error:
                     continue
 
-    thread = threading.Thread(target=look)
-    thread.start()
-    try:
+    with beside([look]):
         yield
-    finally:
-        stop.set()
-        thread.join()
 
 
 def send(url: str, process: psutil.Process, path: Path) -> Sent:
@@ -87,25 +82,21 @@ def send(url: str, process: psutil.Process, path: Path) -> Sent:
     connection.blocksize = 2**20
     with watched(process, most):
         length = {**TUS, "Upload-Length": str(size)}
-        location = _asked(connection, "POST", "/v1/uploads", length).headers["Location"]
+        location = _accepted(connection, "POST", "/v1/uploads", length).headers["Location"]
         headers = {**TUS, "Content-Type": "application/offset+octet-stream", "Upload-Offset": "0"}
         begun = time.perf_counter()
         with path.open("rb") as file:
-            connection.request("PATCH", location, file, {**headers, "Content-Length": str(size)})
-            answer = connection.getresponse()
-            answer.read()
+            _accepted(connection, "PATCH", location, {**headers, "Content-Length": str(size)}, file)
         sent = time.perf_counter()
-        if answer.status != 204:
-            raise RuntimeError(f"the upload was answered with {answer.status}")
         while True:
-            there = _asked(connection, "HEAD", location, TUS).headers
+            there = _accepted(connection, "HEAD", location, TUS).headers
             if there["Bentray-State"] in ("done", "refused"):
                 break
             time.sleep(SAMPLE_S)
         read = time.perf_counter()
     if there["Bentray-State"] != "done":
         raise RuntimeError("the upload was refused")
-    _asked(connection, "DELETE", there["Bentray-Result"], {})
+    _accepted(connection, "DELETE", there["Bentray-Result"], {})
     connection.close()
     return Sent(size, sent - begun, read - sent, idle, most["service"], most["reader"])
 
@@ -116,12 +107,10 @@ def room_for(folder: Path, size: float) -> bool:
     return usage.free - 3 * size > 0.1 * usage.total
 
 
-def _asked(
-    connection: http.client.HTTPConnection, method: str, path: str, headers: dict[str, str]
-) -> http.client.HTTPResponse:
-    connection.request(method, path, headers=headers)
-    answer = connection.getresponse()
-    answer.read()
+def _accepted(
+    connection: HTTPConnection, method: str, path: str, headers: dict[str, str], body: BinaryIO | None = None
+) -> HTTPResponse:
+    answer = asked(connection, method, path, body, headers)
     if answer.status >= 400:
         raise RuntimeError(f"{method} {path} was answered with {answer.status}")
     return answer

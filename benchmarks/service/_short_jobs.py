@@ -1,19 +1,18 @@
 """Duration of a short job beside long jobs of another tenant, from its submission to its end."""
 
-import json
 import os
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import httpx
 import numpy as np
 
 from bentray_service.cli.output.benchmark_row import Row
 
 from ..shared._synthetic_scan import made_up_scan
-from ._http_load import connect
 
 # Tenants are users of a proxy, as which every client of this machine counts.
 SETTINGS = {
@@ -28,7 +27,7 @@ SHORT = {"nodes": 96, "iterations": 4, "method": "sart", "attenuation": {"enable
 ENDED = ("succeeded", "failed", "cancelled")
 MANY = 20
 GOAL_S = 8.0
-POLL_S, PATIENCE_S = 0.05, 300.0
+POLL_S, PATIENCE_S, TIMEOUT_S = 0.05, 300.0, 60.0
 
 
 def short_jobs(url: str, folder: Path, *, quick: bool) -> Iterator[Row]:
@@ -91,24 +90,18 @@ def _seconds(url: str, asked: dict[str, Any]) -> float:
 
 def _upload(url: str, who: str, path: Path) -> str:
     headers = {"Content-Type": "application/x-hdf5"}
-    return str(_sent(url, who, "POST", "/v1/datasets", path.read_bytes(), headers)["id"])
+    return str(_sent(url, who, "POST", "/v1/datasets", content=path.read_bytes(), headers=headers)["id"])
 
 
 def _asked(url: str, who: str, verb: str, path: str, body: dict[str, Any] | None = None) -> dict[str, Any]:
-    content = None if body is None else json.dumps(body).encode()
-    return _sent(url, who, verb, path, content, {"Content-Type": "application/json"})
+    return _sent(url, who, verb, path, json=body)
 
 
 def _sent(
-    url: str, who: str, verb: str, path: str, content: bytes | None, headers: Mapping[str, str]
+    url: str, who: str, verb: str, path: str, headers: dict[str, str] | None = None, **body: Any
 ) -> dict[str, Any]:
-    connection = connect(url)
-    try:
-        connection.request(verb, path, content, {**headers, "X-Forwarded-User": who})
-        answer = connection.getresponse()
-        text = answer.read()
-        assert answer.status < 300, (answer.status, text[:300])
-        body: dict[str, Any] = json.loads(text)
-        return body
-    finally:
-        connection.close()
+    named = {**(headers or {}), "X-Forwarded-User": who}
+    answer = httpx.request(verb, url + path, headers=named, timeout=TIMEOUT_S, trust_env=False, **body)
+    assert answer.is_success, (answer.status_code, answer.text[:300])
+    record: dict[str, Any] = answer.json()
+    return record

@@ -3,29 +3,27 @@
 from __future__ import annotations
 
 import os
-import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from itertools import repeat
 from pathlib import Path
 from typing import Any
 
 import httpx
 import numpy as np
-import trimesh
 
 from bentray_kernels.meshes.example_surfaces import torus
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
-from bentray_service.cli.service_process import running_service
 
 from ..shared._synthetic_scan import made_up_bursts, made_up_scan
+from ._http_load import beside, served
 from ._short_jobs import ENDED
-from .orbit import PREVIEW, stored, stored_volume
-from .service_load import environment
+from .orbit import PREVIEW, mesh_file, stored, stored_volume
 
 SETTINGS = {"BENTRAY_WORKERS": "2", "BENTRAY_REQUESTS_PER_MINUTE": "0"}
 # A scan of 128 x 256 traces, and faces along and around the mesh of a field that takes minutes.
@@ -61,13 +59,11 @@ class Action:
 def rows(context: BenchmarkContext) -> Iterable[Row]:
     """Each action alone and beside the two jobs, with the load at its end."""
     with (
-        tempfile.TemporaryDirectory() as name,
-        environment(SETTINGS),
-        running_service(Path(name) / "data", Path(name) / "log") as url,
+        served(SETTINGS) as (url, folder),
         httpx.Client(base_url=url, timeout=PATIENCE_S, trust_env=False) as http,
     ):
         context.progress(0, 3, "uploads")
-        page = _Page(http, Path(name), context.quick)
+        page = _Page(http, folder, context.quick)
         # Kernels that no worker compiles at its start are not what this measures.
         for action in page.actions():
             action.act(-1)
@@ -86,9 +82,7 @@ class _Page:
         self._scan = self._uploaded(made_up_bursts(folder / "traces.h5", *(QUICK_SCAN if quick else SCAN)))
         self._times = self._uploaded(made_up_scan(folder / "times.h5", 128, 1))
         self._volume = stored_volume(http, VOLUME_NODES)["id"]
-        ring = torus(*FACES)
-        content = trimesh.Trimesh(ring.vertices, ring.faces, process=False).export(file_type="ply")
-        self._mesh = stored(http, "/v1/meshes", content)["id"]
+        self._mesh = stored(http, "/v1/meshes", mesh_file(torus(*FACES)))["id"]
         self._result = self._done({"method": "sart", "nodes": 96, "iterations": 1})["volume"]
 
     def actions(self) -> list[Action]:
@@ -133,18 +127,10 @@ class _Page:
             {"kind": "geometry-field", "mesh": self._mesh, "settings": {"image_size": size}}
             for size in range(513, 33, -1)
         )
-        leave = threading.Event()
-        threads = [threading.Thread(target=self._run, args=(jobs, leave)) for jobs in (repeat(best), fields)]
-        for thread in threads:
-            thread.start()
-        time.sleep(SETTLE_S)
-        try:
+        with beside([partial(self._run, jobs) for jobs in (repeat(best), fields)]) as threads:
+            time.sleep(SETTLE_S)
             yield
             assert all(thread.is_alive() for thread in threads), "a long job failed"
-        finally:
-            leave.set()
-            for thread in threads:
-                thread.join()
 
     def _run(self, requests: Iterator[dict[str, Any]], leave: threading.Event) -> None:
         """Jobs one after the other, until one fails."""

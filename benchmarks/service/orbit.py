@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import io
 import os
-import tempfile
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 from urllib.parse import urlencode
 
@@ -19,13 +17,14 @@ import psutil
 import trimesh
 
 from bentray_kernels.meshes.example_surfaces import torus
+from bentray_kernels.meshes.mesh import TriangleMesh
 from bentray_kernels.phantoms import TWO_HOLES, sampled
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.exit_codes import WorkFailed
-from bentray_service.cli.service_process import running_service
 
 from . import _orbit_page
+from ._http_load import served
 
 NODES, QUICK_NODES = 192, 64
 # Faces along and around a ring.
@@ -93,26 +92,21 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         context.progress(done, steps, name)
         done += 1
 
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        with (
-            running_service(folder / "data", folder / "log") as url,
-            httpx.Client(base_url=url, timeout=120.0, trust_env=False) as http,
-        ):
-            volume = stored_volume(http, QUICK_NODES if context.quick else NODES)
-            mesh, picture = stored_field(http, context.quick)
-            sets = (
-                (VOLUMES, str(volume["links"]["refraction"]), f"{url}/#/rendering/{volume['id']}"),
-                (SURFACES, picture, f"{url}/#/surfaces/{mesh}"),
-            )
-            for modes, address, _ in sets:
-                for mode in modes:
-                    step(mode.name)
-                    yield from turned(http, address, mode, context.quick, detail)
-            for modes, _, page in sets:
-                for mode in modes:
-                    step(f"{mode.name} in the page")
-                    yield from turned_in_page(page, mode, context.quick, detail)
+    with served() as (url, _), httpx.Client(base_url=url, timeout=120.0, trust_env=False) as http:
+        volume = stored_volume(http, QUICK_NODES if context.quick else NODES)
+        mesh, picture = stored_field(http, context.quick)
+        sets = (
+            (VOLUMES, str(volume["links"]["refraction"]), f"{url}/#/rendering/{volume['id']}"),
+            (SURFACES, picture, f"{url}/#/surfaces/{mesh}"),
+        )
+        for modes, address, _ in sets:
+            for mode in modes:
+                step(mode.name)
+                yield from turned(http, address, mode, context.quick, detail)
+        for modes, _, page in sets:
+            for mode in modes:
+                step(f"{mode.name} in the page")
+                yield from turned_in_page(page, mode, context.quick, detail)
 
 
 def stored_volume(http: httpx.Client, nodes: int) -> dict[str, Any]:
@@ -128,9 +122,7 @@ def stored_field(http: httpx.Client, quick: bool) -> tuple[str, str]:
     Raises:
         WorkFailed: if it is not built.
     """
-    ring = torus(*(QUICK_RING if quick else RING))
-    content = trimesh.Trimesh(ring.vertices, ring.faces, process=False).export(file_type="ply")
-    mesh = str(stored(http, "/v1/meshes", content)["id"])
+    mesh = str(stored(http, "/v1/meshes", mesh_file(torus(*(QUICK_RING if quick else RING))))["id"])
     asked = {"kind": "geometry-field", "mesh": mesh, "settings": QUICK_FIELD if quick else {}}
     job = http.post("/v1/jobs", json=asked).raise_for_status().json()
     until = time.monotonic() + FIELD_S
@@ -142,6 +134,11 @@ def stored_field(http: httpx.Client, quick: bool) -> tuple[str, str]:
     if job["state"] != "succeeded":
         raise WorkFailed(f"the geometry field was not built: {job['error']}")
     return mesh, str(job["links"]["image"])
+
+
+def mesh_file(mesh: TriangleMesh) -> bytes:
+    """A mesh as PLY."""
+    return trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).export(file_type="ply")
 
 
 def processor_s() -> dict[str, float]:

@@ -1,19 +1,17 @@
 """The web page in Chromium: time to its first paint, and to each slice while a volume is scrubbed."""
 
 import os
-import tempfile
 from collections.abc import Iterable, Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
-from bentray_service.cli.service_process import running_service
 from bentray_service.client import Client
 
 from . import _orbit_page
+from ._http_load import served
 
 # Slices of a 3-D breast phantom, along travel times.
 SCAN = {"phantom": "table7", "nodes": 48, "elements": 32, "slices": 4}
@@ -51,16 +49,11 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
     if reason := _orbit_page.missing():
         yield from (Row(label, None, goal, "<", "ms", reason) for label, goal in labels)
         return
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        with running_service(folder / "data", folder / "log") as url, Client(url) as client:
-            context.progress(0, 4, "reconstructing a volume")
-            scan = client.wait(client.simulate(SCAN).id).dataset
-            job = client.wait(
-                client.submit(str(scan), {"method": "sart", "nodes": nodes, "iterations": 1}).id
-            )
-            result = f"{url}/#/jobs/{job.id}"
-            yield from _measured(context, labels, url, result)
+    with served() as (url, _), Client(url) as client:
+        context.progress(0, 4, "reconstructing a volume")
+        scan = client.wait(client.simulate(SCAN).id).dataset
+        job = client.wait(client.submit(str(scan), {"method": "sart", "nodes": nodes, "iterations": 1}).id)
+        yield from _measured(context, labels, url, f"{url}/#/jobs/{job.id}")
 
 
 def _measured(

@@ -2,48 +2,45 @@
 
 import http.client
 import os
-import tempfile
+import socket
+import threading
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import psutil
 
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
-from bentray_service.cli.service_process import running_service
 from bentray_service.client import Client
 
 from ..shared._synthetic_scan import made_up_scan
-from ._http_load import Calls, connect, got, load
+from ._http_load import Calls, asked, beside, connect, got, load, served
 from ._large_upload import TUS, large_scan, room_for, send
 from ._short_jobs import SETTINGS as TWO_TENANTS
 from ._short_jobs import short_jobs
-from ._slow_clients import dripping
 
 GIGABYTE = 1e9
 SIZES, QUICK_SIZES = (1.0, 10.0), (0.2,)
 CALLERS = 8
-SLOW = 100
+# Connections that send one byte a second of a large body, and its bytes.
+SLOW, ANNOUNCED_BYTES = 100, 10**6
 SETTINGS = {"BENTRAY_MAX_UPLOAD_BYTES": str(2**36), "BENTRAY_WORKERS": "1"}
 
 
 def rows(context: BenchmarkContext) -> Iterable[Row]:
     """All rows, with the load that they began under; ``quick`` takes less of everything."""
     busy = os.getloadavg()[0]
-    with tempfile.TemporaryDirectory() as name, environment(SETTINGS):
-        folder = Path(name)
-        with running_service(folder / "data", folder / "log") as url:
-            process = next(child for child in psutil.Process().children() if "serve" in child.cmdline())
-            for row in measured(url, process, folder, context.quick, context.progress):
-                yield replace(row, detail=f"{row.detail}; load average {busy:.1f} at the start")
+    with served(SETTINGS) as (url, folder):
+        process = next(child for child in psutil.Process().children() if "serve" in child.cmdline())
+        for row in measured(url, process, folder, context.quick, context.progress):
+            yield replace(row, detail=f"{row.detail}; load average {busy:.1f} at the start")
     context.progress(3, 4, "short jobs")
-    with tempfile.TemporaryDirectory() as name, environment(TWO_TENANTS):
-        folder = Path(name)
-        with running_service(folder / "data", folder / "log") as url:
-            yield from short_jobs(url, folder, quick=context.quick)
+    with served(TWO_TENANTS) as (url, folder):
+        yield from short_jobs(url, folder, quick=context.quick)
 
 
 def measured(url: str, process: psutil.Process, folder: Path, quick: bool, progress: Step) -> Iterator[Row]:
@@ -68,6 +65,29 @@ def slow_clients(url: str, seconds: float) -> Iterator[Row]:
         yield Row(f"health beside slow {name}, p99", p99_ms(calls), 200.0, "<", "ms", detail)
 
 
+@contextmanager
+def dripping(url: str, requests: list[tuple[str, str, Mapping[str, str]]]) -> Iterator[None]:
+    """Hold one connection for each ``(method, path, headers)``, each sending a byte a second."""
+    address = urlsplit(url)
+    with ExitStack() as stack:
+        connections = []
+        for method, path, headers in requests:
+            connection = stack.enter_context(socket.create_connection((address.hostname, address.port)))
+            lines = {"Host": address.netloc, "Content-Length": str(ANNOUNCED_BYTES), **headers}
+            head = "".join(f"{name}: {value}\r\n" for name, value in lines.items())
+            connection.sendall(f"{method} {path} HTTP/1.1\r\n{head}\r\n".encode())
+            connections.append(connection)
+
+        def drip(stop: threading.Event) -> None:
+            while not stop.wait(1.0):
+                for connection in connections:
+                    with suppress(OSError):
+                        connection.sendall(b"x")
+
+        with beside([drip]):
+            yield
+
+
 def beside_work(url: str, folder: Path, seconds: float, quick: bool) -> Iterator[Row]:
     """Requests a second and their 99th percentile while the one worker reconstructs."""
     nodes, elements, slices = (64, 64, 4) if quick else (128, 256, 16)
@@ -81,10 +101,7 @@ def beside_work(url: str, folder: Path, seconds: float, quick: bool) -> Iterator
 
         def upload(connection: http.client.HTTPConnection, number: int) -> bool:
             headers = {"Content-Type": "application/x-hdf5"}
-            connection.request("POST", "/v1/datasets", content, headers)
-            answer = connection.getresponse()
-            answer.read()
-            return answer.status == 201
+            return asked(connection, "POST", "/v1/datasets", content, headers).status == 201
 
         ways = (
             ("status polls", CALLERS, lambda c, k: got(c, f"/v1/jobs/{job}"), 100.0, 200.0),
@@ -126,10 +143,8 @@ def large_upload(url: str, process: psutil.Process, folder: Path, gigabytes: flo
 def begun(url: str) -> str:
     """The path of an upload that has been begun."""
     connection = connect(url)
-    headers = {**TUS, "Upload-Length": "1000000"}
-    connection.request("POST", "/v1/uploads", headers=headers)
-    answer = connection.getresponse()
-    answer.read()
+    length = {**TUS, "Upload-Length": str(ANNOUNCED_BYTES)}
+    answer = asked(connection, "POST", "/v1/uploads", None, length)
     connection.close()
     return answer.headers["Location"]
 
@@ -140,18 +155,3 @@ def piece_headers() -> Mapping[str, str]:
 
 def p99_ms(calls: Calls) -> float | None:
     return None if calls.failed else 1e3 * calls.percentile(99)
-
-
-@contextmanager
-def environment(values: Mapping[str, str]) -> Iterator[None]:
-    """Environment variables for the block."""
-    before = {name: os.environ.get(name) for name in values}
-    os.environ.update(values)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
