@@ -2,21 +2,21 @@
 
 import os
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 
-from bentray_kernels.acquisition import Dataset, Truth, Waveform
+from bentray_kernels.acquisition import Dataset, Waveform
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.wave.medium import Medium
 from bentray_kernels.wave.simulation import simulate
 from bentray_service.cli.output.terminal import Step
-from bentray_workers.simulation.plane import ring_radius
 from bentray_workers.simulation.waves import (
     BEFORE,
     EDGE_NODES,
     ORDER,
-    SAMPLES_A_PERIOD,
     WaveSimulationSettings,
+    scan_of,
 )
 
 from ._absorption import Absorbing, simulate_absorbed
@@ -63,22 +63,7 @@ def lossy_scan(settings: WaveSimulationSettings, progress: Step, *, proportional
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         for k, _ in enumerate(pool.map(emission, range(settings.emissions))):
             progress(k, settings.emissions, "simulating waves with loss")
-    apart = settings.side_m / (settings.nodes - 1)
-    return Dataset(
-        element_position_m=settings.elements_m(),
-        tx=settings.senders(),
-        rx=np.arange(settings.elements),
-        water_speed_mps=settings.coupling_mps,
-        waveform=Waveform(traces[0], traces[1]),
-        roi=phantom.inside(settings.nodes, TABLE6_SIDE_M),
-        truth=Truth(
-            phantom.speed(settings.nodes, TABLE6_SIDE_M),
-            (apart, apart),
-            (-0.5 * settings.side_m, -0.5 * settings.side_m),
-            ratio * phantom.attenuation(settings.nodes, TABLE6_SIDE_M),
-        ),
-        radius_m=ring_radius(settings.side_m, settings.nodes),
-        center_frequency_hz=settings.frequency_hz,
-        sampling_rate_hz=SAMPLES_A_PERIOD * settings.frequency_hz,
-        t0_s=-BEFORE / settings.frequency_hz,
-    )
+    scan = scan_of(settings, Waveform(traces[0], traces[1]))
+    assert scan.truth is not None
+    losses = ratio * phantom.attenuation(settings.nodes, TABLE6_SIDE_M)
+    return replace(scan, truth=replace(scan.truth, attenuation_np_m=losses), source="", title="")

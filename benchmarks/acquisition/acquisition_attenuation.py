@@ -3,22 +3,18 @@
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 
 from bentray_kernels.acquisition import Dataset, pick
 from bentray_kernels.tomography import Reconstruction, Settings, reconstruct
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import CONSTANTS, STRAIGHT_RAYS, Row
 from bentray_service.cli.output.terminal import Step
-from bentray_workers.files.dataset import read_dataset
 from bentray_workers.simulation.waves import WaveSimulationSettings
 
 from ..shared._baselines import Images
 from ..shared._image_error import object_attenuation_error
+from ..shared._recorded_scans import other_scan
 from ._lossy_scan import lossy_scan
-
-# A scan simulated by another solver, not in the repository.
-OTHERS = Path(__file__).parents[3] / "shared" / "data" / "ring_wave_a.h5"
 
 # The scan of this frequency is used for its spectra; FWI over so many wavelengths would take minutes.
 FINE_HZ = 1e6
@@ -68,8 +64,8 @@ def scans(quick: bool, progress: Step) -> Iterable[tuple[str, Dataset]]:
         scan = WaveSimulationSettings(frequency, side, elements, emissions, nodes=nodes)
         name = f"simulated {1e-3 * frequency:.0f} kHz{', loss as the frequency' if proportional else ''}"
         yield name, lossy_scan(scan, progress, proportional=proportional)
-    if not quick and OTHERS.exists():
-        yield "ring_wave_a 400 kHz", read_dataset(OTHERS)
+    if not quick:
+        yield from other_scan()
 
 
 def run(progress: Step, dataset: Dataset, settings: Settings) -> Reconstruction:

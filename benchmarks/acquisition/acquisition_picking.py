@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
@@ -11,14 +10,10 @@ from bentray_kernels.acquisition import PICKERS, Dataset, pick
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
-from bentray_workers.files.dataset import read_dataset
-from bentray_workers.simulation.simulation_run import simulate
 from bentray_workers.simulation.waves import WaveSimulationSettings
 
+from ..shared._recorded_scans import SMALL, other_scan, wave_scan
 from ._ideal_times import ideal
-
-# A scan simulated by another solver, not in the repository.
-OTHERS = Path(__file__).parents[3] / "shared" / "data" / "ring_wave_a.h5"
 
 # Full width of the average of the slowness by a pulse, wavelengths: its Fresnel zone.
 SEEN_WAVELENGTHS = 2.0
@@ -39,11 +34,9 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
 
 def scan(quick: bool, progress: Step) -> tuple[str, Dataset]:
     """The external scan if present; else, and in a quick run, a simulated one."""
-    if OTHERS.exists() and not quick:
-        return "ring_wave_a", read_dataset(OTHERS)
-    asked = WaveSimulationSettings(3e5, 0.05, 32, 16, nodes=64) if quick else WaveSimulationSettings()
-    made = simulate(asked, lambda now: progress(now.done, now.total, "simulating waves"))
-    return f"simulated {1e-3 * asked.frequency_hz:.0f} kHz", made
+    for _, dataset in () if quick else other_scan():
+        return "ring_wave_a", dataset
+    return wave_scan(SMALL if quick else WaveSimulationSettings(), progress, "simulating waves")
 
 
 def blurred_times(dataset: Dataset) -> np.ndarray:

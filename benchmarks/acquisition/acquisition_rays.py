@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -13,18 +12,16 @@ from bentray_kernels.tomography.model_selection.selection import explain_candida
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import STRAIGHT_RAYS, Row
 from bentray_workers.files.dataset import read_dataset
-from bentray_workers.simulation.simulation_run import simulate
 from bentray_workers.simulation.waves import WaveSimulationSettings
 
 from ..shared._baselines import Images
 from ..shared._image_error import object_error
-from ..shared._trace_noise import with_trace_noise
+from ..shared._recorded_scans import OTHERS, SMALL, other_scan, wave_scan, with_trace_noise
 from ._ideal_times import ideal
 from ._registration import registered, registered_error
 
-# Scans that are not in the repository.
-DATA = Path(__file__).parents[3] / "shared" / "data"
-OTHERS, MEASURED = DATA / "ring_wave_a.h5", DATA / "openust_measured.h5"
+# A measurement that is not in the repository.
+MEASURED = OTHERS.with_name("openust_measured.h5")
 
 # Phantom of Table 6. A scan of f Hz on a side of s m is equivalent to one of 2·f on s/2, so that sides are
 # chosen by the cost of the simulation: 40, 78 and 91 wavelengths across the ring.
@@ -33,7 +30,6 @@ SCANS = (
     WaveSimulationSettings(1e6, 0.12, 128, 32),
     WaveSimulationSettings(2e6, 0.07, 128, 16),
 )
-QUICK = WaveSimulationSettings(3e5, 0.05, 32, 16, nodes=64)
 SNRS = (np.inf, 30.0, 10.0)
 
 # Radius of the region in which the authors of the measurement evaluate their error, m.
@@ -42,14 +38,14 @@ RADIUS_M = 0.0675
 
 def rows(context: BenchmarkContext) -> Iterable[Row]:
     """R4 for each scan and noise; R7, unless quick."""
-    for asked in (QUICK,) if context.quick else SCANS:
+    for asked in (SMALL,) if context.quick else SCANS:
         name = f"simulated {1e-3 * asked.frequency_hz:.0f} kHz, {1e3 * asked.side_m:.0f} mm"
-        clean = simulate(asked, lambda now, n=name: context.progress(now.done, now.total, n))
+        _, clean = wave_scan(asked, context.progress, name)
         for snr in (30.0,) if context.quick else SNRS:
             detail = name + (f", SNR {snr:g}" if snr < np.inf else ", no noise")
             yield from scan_rows(detail, with_trace_noise(clean, snr))
-    if not context.quick and OTHERS.exists():
-        yield from scan_rows("ring_wave_a 400 kHz", read_dataset(OTHERS))
+    for scan in () if context.quick else other_scan():
+        yield from scan_rows(*scan)
     yield from measured(context.quick)
 
 

@@ -3,7 +3,6 @@
 import os
 from collections.abc import Iterable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 from bentray_kernels.acquisition import Dataset, pick
@@ -12,18 +11,14 @@ from bentray_kernels.tomography.model_selection.finite_frequency_candidates impo
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
-from bentray_workers.files.dataset import read_dataset
-from bentray_workers.simulation.simulation_run import simulate
 from bentray_workers.simulation.waves import WaveSimulationSettings
 
 from ..shared._baselines import Images
 from ..shared._image_error import object_error
 from ..shared._reconstruction_on_workers import Made, reconstruct_on_workers
+from ..shared._recorded_scans import SMALL, other_scan, wave_scan
 from ._acquisition_picture import picture
 from ._ideal_times import ideal
-
-# A scan simulated by another solver, not in the repository.
-OTHERS = Path(__file__).parents[3] / "shared" / "data" / "ring_wave_a.h5"
 
 # W1: errors before inversions were made faster (2026-11-23), m/s, when they took about 95 and 160 s.
 BEFORE_MPS = {"simulated 500 kHz": 4.249, "ring_wave_a 400 kHz": 11.635}
@@ -51,12 +46,9 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
 
 def scans(quick: bool, progress: Step) -> Iterable[tuple[str, Dataset]]:
     """Names and scans, with traces."""
-    small = WaveSimulationSettings(3e5, 0.05, 32, 16, nodes=64, snr=30.0)
-    for asked in (small,) if quick else (WaveSimulationSettings(snr=30.0),):
-        name = f"simulated {1e-3 * asked.frequency_hz:.0f} kHz"
-        yield name, simulate(asked, lambda now, n=name: progress(now.done, now.total, n))
-    if not quick and OTHERS.exists():
-        yield "ring_wave_a 400 kHz", read_dataset(OTHERS)
+    yield wave_scan(replace(SMALL if quick else WaveSimulationSettings(), snr=30.0), progress)
+    if not quick:
+        yield from other_scan()
 
 
 class WaveScan:

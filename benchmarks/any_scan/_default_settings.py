@@ -9,16 +9,14 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from bentray_kernels.acquisition import Dataset
-from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography.model_selection.selection import explain_candidates
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_workers.simulation.plane import SimulationSettings
 from bentray_workers.simulation.simulation_run import simulate
 
-from ..shared._baselines import Images
 from ..shared._image_error import object_error
-from ..shared._reconstruction_on_workers import reconstruct_on_workers
+from ..shared._reconstruction_on_workers import images_on_workers, reconstruct_in_ways
 from ._images_beside_truth import images_beside_truth
 
 # The target is 27 m/s where the truth differs from itself, blurred by this, m, by 19 m/s.
@@ -47,17 +45,9 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
             noise_s=noise,
         )
         dataset = simulate(asked, lambda now: context.progress(now.done, now.total, "simulation"))
-        images = {
-            way: reconstruct_on_workers(dataset, Settings.from_values(attenuation=False, **changes), context)
-            for way, changes in WAYS.items()
-        }
+        images = reconstruct_in_ways(dataset, WAYS, context)
         default, blurred = images["default"], blurred_error(dataset)
-        made = Images(
-            dataset,
-            lambda scan, settings: reconstruct_on_workers(scan, settings, context).result,
-            Settings.from_values(attenuation=False),
-        )
-        compared = made.compared(default.result, object_error(dataset))
+        compared = images_on_workers(dataset, context).compared(default.result, object_error(dataset))
         detail = f"truth blurred by 1 mm {blurred:.1f}, "
         detail += ", ".join(f"{way} {made.rms:.1f} in {made.seconds:.1f} s" for way, made in images.items())
         nodes = default.result.settings.nodes

@@ -8,19 +8,16 @@ import numpy as np
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.phantoms import DETAILED_SIDE_M, DetailedBreast
-from bentray_kernels.tomography import Settings
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
 
-from ..shared._baselines import Images
 from ..shared._image_error import object_error
-from ..shared._reconstruction_on_workers import reconstruct_on_workers
+from ..shared._reconstruction_on_workers import images_on_workers, reconstruct_in_ways
+from ..shared._recorded_scans import planted, with_trace_noise, without_water_shot
 from ..shared._ring_scan import RingScan
-from ..shared._trace_noise import with_trace_noise
 from ..waves._kwave_peer import Peer, installed
 from ._images_beside_truth import images_beside_truth
-from ._planted_scan import planted, without_water_shot
 
 WATER_MPS, CENTRE_HZ, SIDE_M, RING = 1480.0, 3e5, 0.12, 0.45
 ELEMENTS, EMISSIONS, SNR = 128, 48, 30.0
@@ -45,17 +42,10 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
     if not peers or context.quick:
         return
     dataset = without_water_shot(planted(simulated(peers["k-Wave"], context.progress), 2))
-    images = {
-        way: reconstruct_on_workers(dataset, Settings.from_values(attenuation=False, **changes), context)
-        for way, changes in WAYS.items()
-    }
+    images = reconstruct_in_ways(dataset, WAYS, context)
     detail = ", ".join(f"{way} {made.rms:.1f} in {made.seconds:.0f} s" for way, made in images.items())
     detail += f" (m/s); load at the end {os.getloadavg()[0]:.1f}"
-    made = Images(
-        dataset,
-        lambda scan, settings: reconstruct_on_workers(scan, settings, context).result,
-        Settings.from_values(attenuation=False),
-    )
+    made = images_on_workers(dataset, context)
     for way, goal in GOALS.items():
         ratio = images[way].rms / images["straight"].rms
         target = f"k-Wave scan without water shot, {way}: error over straight rays"

@@ -2,27 +2,20 @@
 
 import os
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import Any
 
 from bentray_kernels.acquisition import Dataset
-from bentray_kernels.tomography import Reconstruction, Settings
+from bentray_kernels.tomography import Settings
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
-from bentray_service.cli.output.benchmark_row import BEST_CONSTANT, WATER_ALONE, Row
+from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
-from bentray_workers.files.dataset import read_dataset
-from bentray_workers.simulation.simulation_run import simulate
 from bentray_workers.simulation.waves import WaveSimulationSettings
 
 from ..shared._baselines import Images
 from ..shared._image_error import object_error
-from ..shared._reconstruction_on_workers import Made, reconstruct_on_workers
+from ..shared._reconstruction_on_workers import Made, images_on_workers, reconstruct_on_workers
+from ..shared._recorded_scans import other_scan, planted, wave_scan, without_water_shot
 from ._images_beside_truth import images_beside_truth
-from ._planted_scan import planted, without_water_shot
-
-# A scan simulated by another solver, not in the repository.
-OTHERS = Path(__file__).parents[3] / "shared" / "data" / "ring_wave_a.h5"
-
 
 # Largest error without the water shot, relative to that with it.
 GOALS = {"auto": 1.05, "waveform": 1.15}
@@ -48,11 +41,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
             for shot, scan in (("with", dataset), ("none", without_water_shot(dataset))):
                 images[f"{way}, {shot}"] = reconstruct_on_workers(scan, settings, context)
         shown[name] = dataset, {way: images[way] for way in SHOWN}
-        made = Images(
-            without_water_shot(dataset),
-            lambda scan, settings: reconstruct_on_workers(scan, settings, context).result,
-            Settings.from_values(attenuation=False),
-        )
+        made = images_on_workers(without_water_shot(dataset), context)
         yield from scan_rows(name, dataset, images, made)
     title = "Images with the water shot, and with one estimated from the scan (none)"
     context.save_picture("any_scan_without_water_shot.png", lambda: images_beside_truth(title, shown))
@@ -63,10 +52,10 @@ def scans(quick: bool, progress: Step) -> Iterable[tuple[str, Dataset]]:
     asked = WaveSimulationSettings(3e5, 0.12, 128, 48, nodes=128, snr=30.0)
     if quick:
         asked = WaveSimulationSettings(3e5, 0.1, 64, 32, nodes=64, snr=30.0)
-    made = simulate(asked, lambda now: progress(now.done, now.total, "simulation"))
-    yield f"simulated {1e-3 * asked.frequency_hz:.0f} kHz, planted", planted(made, 1)
-    if not quick and OTHERS.exists():
-        yield "ring_wave_a 400 kHz", read_dataset(OTHERS)
+    name, made = wave_scan(asked, progress, "simulation")
+    yield f"{name}, planted", planted(made, 1)
+    if not quick:
+        yield from other_scan()
 
 
 def scan_rows(name: str, dataset: Dataset, images: Mapping[str, Made], made: Images) -> Iterable[Row]:
@@ -78,12 +67,3 @@ def scan_rows(name: str, dataset: Dataset, images: Mapping[str, Made], made: Ima
         ratio = image.rms / images[f"{way}, with"].rms
         target = f"A1 {name}, {way}: error without over with water shot"
         yield made.compared(image.result, object_error(dataset)).row(target, ratio, goal, "<=", "", detail)
-
-
-def constants(dataset: Dataset, result: Reconstruction) -> dict[str, float]:
-    """Errors of the best constant and of water alone on the grid of a result, m/s."""
-    error = object_error(dataset)(result)
-    return {
-        BEST_CONSTANT: error.of_constant(error.best_constant),
-        WATER_ALONE: error.of_constant(dataset.water_speed_mps),
-    }

@@ -1,9 +1,7 @@
 """Whole reconstructions on an OpenCL device beside the times of the dissertation's graphics card."""
 
-import time
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -14,12 +12,13 @@ from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Settings
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
-from bentray_workers.files.dataset import read_dataset, write_dataset
-from bentray_workers.reconstruction.reconstruction_run import reconstruct
+from bentray_workers.files.dataset import read_dataset
 from bentray_workers.simulation.simulation_run import simulate
 from bentray_workers.simulation.waves import WaveSimulationSettings
 
 from ..shared._image_error import object_error
+from ..shared._reconstruction_on_workers import reconstruct_file
+from ..shared._recorded_scans import OTHERS, SMALL
 
 COUPLING_MPS = 1375.0
 ITERATIONS = 3
@@ -28,10 +27,7 @@ ITERATIONS = 3
 VOLUMES = ((128, 40, 256, 30.9, 30.9), (256, 44, 512, 3.0, 225.76))
 QUICK_VOLUME = (32, 4, 16, 3.0, None)
 
-# A scan simulated by another solver, not in the repository.
-OTHERS = Path(__file__).parents[3] / "shared" / "data" / "ring_wave_a.h5"
 WAVEFORM_S = 6.0
-QUICK_WAVES = WaveSimulationSettings(3e5, 0.05, 32, 16, nodes=64, snr=30.0)
 
 ON_PROCESSORS = (
     "takes up to hours on a processor, so it is measured on other devices; --quick takes a small one"
@@ -59,7 +55,9 @@ def whole_runs(context: BenchmarkContext, device: Device) -> Iterable[Row]:
 def waveforms(context: BenchmarkContext, device: Device) -> Iterable[Row]:
     """Time of full waveforms, with the error of the image."""
     if context.quick:
-        yield waveform("D1 full waveforms, simulated 300 kHz", simulate(QUICK_WAVES), context, device)
+        yield waveform(
+            "D1 full waveforms, simulated 300 kHz", simulate(replace(SMALL, snr=30.0)), context, device
+        )
         return
     scans: tuple[tuple[str, Callable[[], Dataset]], ...] = (
         ("simulated 500 kHz", lambda: simulate(WaveSimulationSettings(snr=30.0))),
@@ -78,14 +76,7 @@ def waveforms(context: BenchmarkContext, device: Device) -> Iterable[Row]:
 def waveform(label: str, dataset: Dataset, context: BenchmarkContext, device: Device) -> Row:
     """The row of one scan with traces and truth."""
     settings = Settings(method="waveform", device="opencl")
-    with context.temporary_folder() as folder:
-        path = folder / "scan.h5"
-        write_dataset(path, dataset)
-        begun = time.perf_counter()
-        result = reconstruct(
-            None, path, settings, lambda now: context.progress(now.done, now.total, label), threads=None
-        )
-        seconds = time.perf_counter() - begun
+    result, seconds = reconstruct_file(dataset, settings, context, None, label, threads=None)
     error = object_error(dataset)(result)
     constant, water = error.of_constant(error.best_constant), error.of_constant(dataset.water_speed_mps)
     detail = (
@@ -117,14 +108,5 @@ def timed(
     assert dataset.delta_tof_s is not None
     assert dataset.slice_z_m is not None
     few = replace(dataset, delta_tof_s=dataset.delta_tof_s[:2], slice_z_m=dataset.slice_z_m[:2])
-    seconds = float("nan")
-    for scan, used in ((few, warm), (dataset, settings)):
-        with context.temporary_folder() as folder:
-            path = folder / "scan.h5"
-            write_dataset(path, scan)
-            begun = time.perf_counter()
-            reconstruct(
-                None, path, used, lambda now: context.progress(now.done, now.total, what), threads=None
-            )
-            seconds = time.perf_counter() - begun
-    return seconds
+    reconstruct_file(few, warm, context, None, what, threads=None)
+    return reconstruct_file(dataset, settings, context, None, what, threads=None).seconds

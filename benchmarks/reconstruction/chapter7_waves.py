@@ -15,7 +15,7 @@ from bentray_service.cli.output.benchmark_row import DEFAULT_SETTINGS, STRAIGHT_
 from bentray_workers.simulation.simulation_run import simulate
 
 from ..shared._baselines import Images
-from ..shared._trace_noise import with_trace_noise
+from ..shared._recorded_scans import with_trace_noise
 from ._sections_picture import Panel, picture
 from ._table7_errors import Slices, contrasts, least_contrast, on_phantom_nodes
 from ._table7_slices import NODES, SliceWaves

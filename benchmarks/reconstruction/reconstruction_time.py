@@ -8,7 +8,7 @@ import numpy as np
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.phantoms import TABLE7_SIDE_M
-from bentray_kernels.tomography import Problem, Reconstruction, Settings
+from bentray_kernels.tomography import Problem, Settings
 from bentray_kernels.tomography.gauss_newton.gauss_newton_step import trace_rays
 from bentray_kernels.tomography.grid_schedule import initial_slowness
 from bentray_kernels.tomography.sart.sart_step import advance, begin
@@ -17,13 +17,12 @@ from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import STRAIGHT_RAYS, Row
 from bentray_service.cli.output.terminal import Step
 from bentray_workers.cluster.connection import Cluster
-from bentray_workers.files.dataset import write_dataset
-from bentray_workers.reconstruction.reconstruction_run import reconstruct
 from bentray_workers.simulation.simulation_run import simulate
 from bentray_workers.simulation.volume import VolumeSimulationSettings
 
 from ..shared._baselines import Images
 from ..shared._image_error import object_error
+from ..shared._reconstruction_on_workers import reconstruct_file
 from ._pass_split import split
 
 COUPLING_MPS = 1375.0
@@ -71,7 +70,12 @@ def volume(nodes: int, slices: int, elements: int, distinct: int, context: Bench
         few = simulated(nodes, distinct, elements, cluster, context.progress)
         many = repeated(few, nodes, slices)
         seconds, made = {}, {}
-        images = Images(few, lambda dataset, settings: run(context, cluster, dataset, settings, "few slices"))
+        images = Images(
+            few,
+            lambda dataset, settings: (
+                reconstruct_file(dataset, settings, context, cluster, "few slices", saved=True).result
+            ),
+        )
         for rays in ("straight", "curved"):
             settings = Settings.from_values(
                 method="sart",
@@ -126,26 +130,10 @@ def timed(
     assert dataset.delta_tof_s is not None
     assert dataset.slice_z_m is not None
     tiny = replace(dataset, delta_tof_s=dataset.delta_tof_s[:2], slice_z_m=dataset.slice_z_m[:2])
-    run(context, cluster, tiny, replace(settings, iterations=1), what)
+    reconstruct_file(tiny, replace(settings, iterations=1), context, cluster, what, saved=True)
     started = time.perf_counter()
-    run(context, cluster, dataset, settings, what)
+    reconstruct_file(dataset, settings, context, cluster, what, saved=True)
     return time.perf_counter() - started
-
-
-def run(
-    context: BenchmarkContext, cluster: Cluster, dataset: Dataset, settings: Settings, what: str
-) -> Reconstruction:
-    """A reconstruction by both workers, from a file."""
-    with context.temporary_folder() as folder:
-        path = folder / "scan.h5"
-        write_dataset(path, dataset)
-        return reconstruct(
-            cluster.client,
-            path,
-            settings,
-            lambda p: context.progress(p.done, p.total, what),
-            work_dir=folder,
-        )
 
 
 def growth(quick: bool, progress: Step) -> Iterable[Row]:

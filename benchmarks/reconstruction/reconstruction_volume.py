@@ -1,23 +1,20 @@
 """R9: the 3-D breast phantom (Table 7) scanned in 3-D, reconstructed slice by slice and in 3-D."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 
-from bentray_kernels.acquisition import Dataset
-from bentray_kernels.tomography import Progress, Reconstruction, Settings
+from bentray_kernels.tomography import Reconstruction, Settings
 from bentray_kernels.tomography.problem import MARGIN_NODES
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
-from bentray_workers.cluster.connection import Cluster
-from bentray_workers.files.dataset import write_dataset
-from bentray_workers.reconstruction.reconstruction_run import reconstruct
 from bentray_workers.simulation.simulation_run import simulate
 from bentray_workers.simulation.volume import VolumeSimulationSettings
 
 from ..shared._baselines import Compared, Images
 from ..shared._image_error import object_error
+from ..shared._reconstruction_on_workers import reconstruct_file
 from ._sections_picture import picture_of_sections
 
 COUPLING_MPS = 1375.0
@@ -28,9 +25,6 @@ FULL, QUICK = (64, 20, 64), (24, 6, 24)
 
 SNR = 10.0
 
-# Of the progress of a simulation or a reconstruction.
-Show = Callable[[Progress], None]
-
 
 def rows(context: BenchmarkContext) -> Iterable[Row]:
     """Errors inside the breast over the range of the phantom, without noise and with SNR 10."""
@@ -40,11 +34,9 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
     )
     size = f"{nodes}² by {slices}, {elements} elements, times in space on a grid twice as fine"
     with context.cluster() as cluster:
-
-        def show(what: str) -> Show:
-            return lambda p: context.progress(p.done, p.total, what)
-
-        clean = simulate(asked, show("simulating in space"), cluster.client)
+        clean = simulate(
+            asked, lambda p: context.progress(p.done, p.total, "simulating in space"), cluster.client
+        )
         delta = clean.delta_tof_s
         sigma = float(np.sqrt(np.nanmean(delta**2))) / SNR
         noise = np.random.default_rng(0).normal(0.0, sigma, delta.shape)
@@ -52,7 +44,10 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         results: dict[str, Reconstruction] = {}
         for label, dataset in (("exact", clean), (f"SNR {SNR:g}", noisy)):
             images = Images(
-                dataset, lambda scan, settings, n=label: run(context, cluster, scan, settings, show(n))
+                dataset,
+                lambda scan, settings, n=label: (
+                    reconstruct_file(scan, settings, context, cluster, n, saved=True).result
+                ),
             )
             compared: dict[str, Compared] = {}
             for way in ("slices", "volume"):
@@ -71,16 +66,6 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
             yield compared["slices"].row(target, worse, 0.003, "<=", "of range", f"NRMSE, {size}")
         context.save_picture("reconstruction_volume.png", lambda: picture_of_sections(clean.truth, results))
         context.progress(1, 1, "done")
-
-
-def run(
-    context: BenchmarkContext, cluster: Cluster, dataset: Dataset, settings: Settings, show: Show
-) -> Reconstruction:
-    """A reconstruction on both cores."""
-    with context.temporary_folder() as folder:
-        path = folder / "scan.h5"
-        write_dataset(path, dataset)
-        return reconstruct(cluster.client, path, settings, show, work_dir=folder)
 
 
 def inner(result: Reconstruction, slices: int) -> Reconstruction:

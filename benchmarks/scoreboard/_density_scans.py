@@ -8,8 +8,8 @@ from bentray_kernels.acquisition import Dataset
 from bentray_kernels.phantoms import DENSITIES, DETAILED_SIDE_M, DetailedBreast
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 
+from ..shared._recorded_scans import with_trace_noise
 from ..shared._ring_scan import RingScan
-from ..shared._trace_noise import with_trace_noise
 from ..waves._kwave_peer import Peer
 
 WATER_MPS, SNR = 1500.0, 30.0

@@ -16,8 +16,8 @@ from bentray_kernels.tomography import Reconstruction, Settings, reconstruct
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 
+from ..shared._recorded_scans import with_trace_noise
 from ..shared._ring_scan import RingScan
-from ..shared._trace_noise import with_trace_noise
 from ._breast_scans import detailed
 
 # Half the size of a breast; the ratio of breast and wavelength is that of 75 kHz at full size.

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from benchmarks.any_scan._planted_scan import (
+from benchmarks.shared._recorded_scans import (
     DEAD_EMISSION,
     DEAD_RECEPTION,
     GAINS,
