@@ -50,7 +50,7 @@ from bentray_workers.simulation.simulation_run import simulate
 
 # The benchmarks are a namespace package of the checkout.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from benchmarks.shared._small_png import in_full_colour
+from benchmarks.shared._pictures import in_full_colour
 
 FOLDER = Path(__file__).parent / "pictures"
 # Beside the checkout, where the tests with real scans look for it.

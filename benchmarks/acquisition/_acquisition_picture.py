@@ -2,16 +2,16 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 
 from bentray_kernels.acquisition import PICKERS, Dataset, Waveform, pick
 from bentray_workers.images.canvas import drawing, new_figure
-from bentray_workers.images.maps import SPEED, draw_bar, draw_map, robust_limits
 
-from ..shared._small_png import figure_png
+from ..any_scan._images_beside_truth import draw_beside_truth
+from ..shared._pictures import figure_png
+from ..shared._reconstruction_on_workers import Made
 
 SHOWN = ("straight", "bent, finite frequency", "waveform")
 
@@ -23,11 +23,11 @@ MARKS = ("#e6194b", "#ffe119", "#3cb44b", "#4363d8", "#f58231", "#42d4f4")
 SIZES = (4.5, 3.9, 3.3, 2.7, 2.1, 1.5)
 
 
-def picture(scans: Mapping[str, tuple[Dataset, Mapping[str, Any]]], seconds: str) -> bytes:
+def picture(scans: Mapping[str, tuple[Dataset, Mapping[str, Made]]], seconds: str) -> bytes:
     """PNG.
 
     Args:
-        scans: by name, the dataset with its traces, and images with ``result``, ``rms`` and ``seconds``.
+        scans: by name, the dataset with its traces, and images.
         seconds: what they are seconds of.
     """
     with drawing():
@@ -37,26 +37,7 @@ def picture(scans: Mapping[str, tuple[Dataset, Mapping[str, Any]]], seconds: str
         panels = figure.subplots(len(scans), len(widths), squeeze=False, width_ratios=widths)
         for row, (name, (dataset, images)) in zip(panels, scans.items(), strict=True):
             gather(row[0], name, dataset)
-            truth = dataset.truth
-            assert truth is not None
-            limits = robust_limits([truth.sound_speed_mps])
-            maps = [
-                draw_map(
-                    row[1],
-                    truth.sound_speed_mps,
-                    truth.spacing_m,
-                    truth.origin_m,
-                    limits,
-                    colormap=SPEED,
-                    title="truth",
-                )
-            ]
-            for axes, way in zip(row[2:], SHOWN, strict=True):
-                image = images[way]
-                title = f"{way}\n{image.rms:.1f} m/s, {image.seconds:.0f} s"
-                grid = (image.result.spacing_m, image.result.origin_m)
-                maps.append(draw_map(axes, image.result.speed, *grid, limits, colormap=SPEED, title=title))
-            draw_bar(maps, "speed (m/s)")
+            draw_beside_truth(row[1:], "truth", dataset, {way: images[way] for way in SHOWN}, "\n")
             same_extent(row[1:])
         # One for all gathers, outside the data.
         marks = panels[-1][0].legend(

@@ -19,8 +19,8 @@ from bentray_workers.images.canvas import drawing, new_figure
 from bentray_workers.images.maps import SPEED, draw_bar, draw_map, robust_limits
 
 from ..shared._baselines import Compared, Images
-from ..shared._image_error import ImageError
-from ..shared._small_png import figure_png
+from ..shared._image_error import ErrorOn, ImageError
+from ..shared._pictures import figure_png
 
 WATER_MPS, RADIUS_M, SIDE_M = 1480.0, 0.095, 0.2
 
@@ -145,18 +145,26 @@ def simulated(array: Array) -> Dataset:
 
 def made(dataset: Dataset) -> Made:
     """The image of a scan, its error and its baselines."""
+    nodes, error_on = (
+        NODES_IN_SPACE if dataset.element_position_m.shape[1] == 3 else None,
+        hull_error(dataset),
+    )
+    images = Images(dataset, reconstruct, Settings(nodes=nodes))
+    result, seconds = images.default()
+    return Made(result, error_on(result), images.compared(result, error_on), seconds)
+
+
+def hull_error(dataset: Dataset) -> ErrorOn:
+    """Root mean square error inside the hull of the array, m/s."""
     truth = dataset.truth
     assert truth is not None
-    nodes = NODES_IN_SPACE if dataset.element_position_m.shape[1] == 3 else None
 
     def error_on(image: Reconstruction) -> ImageError:
         true = on_grid(truth.sound_speed_mps, truth, image)
         # Nodes beside the simulated medium, in which there are elements at most, do not count.
         return ImageError(true, Problem.from_dataset(dataset, image.settings).region & np.isfinite(true))
 
-    images = Images(dataset, reconstruct, Settings(nodes=nodes))
-    result, seconds = images.default()
-    return Made(result, error_on(result), images.compared(result, error_on), seconds)
+    return error_on
 
 
 def array_row(name: str, array: Array, made: Made) -> Row:

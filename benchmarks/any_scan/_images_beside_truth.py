@@ -1,13 +1,17 @@
 """Picture of scans: the truth and its images by several settings, a row for each scan."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
-from bentray_kernels.acquisition import Dataset
+from matplotlib.axes import Axes
+
+from bentray_kernels.acquisition import Dataset, Truth
+from bentray_kernels.arrays import Floats
+from bentray_kernels.tomography import Reconstruction
 from bentray_workers.images.canvas import drawing, new_figure
 from bentray_workers.images.maps import SPEED, draw_bar, draw_map, robust_limits
 
+from ..shared._pictures import figure_png
 from ..shared._reconstruction_on_workers import Made
-from ..shared._small_png import figure_png
 
 
 def images_beside_truth(title: str, scans: Mapping[str, tuple[Dataset, Mapping[str, Made]]]) -> bytes:
@@ -23,15 +27,22 @@ def images_beside_truth(title: str, scans: Mapping[str, tuple[Dataset, Mapping[s
         figure.suptitle(title)
         panels = figure.subplots(len(scans), columns, squeeze=False)
         for row, (name, (dataset, images)) in zip(panels, scans.items(), strict=True):
-            truth = dataset.truth
-            assert truth is not None
-            limits = robust_limits([truth.sound_speed_mps])
-            grid = truth.spacing_m, truth.origin_m
-            heading = f"{name}: truth"
-            maps = [draw_map(row[0], truth.sound_speed_mps, *grid, limits, colormap=SPEED, title=heading)]
-            for axes, (way, made) in zip(row[1:], images.items(), strict=True):
-                heading = f"{way}: {made.rms:.1f} m/s, {made.seconds:.0f} s"
-                grid = made.result.spacing_m, made.result.origin_m
-                maps.append(draw_map(axes, made.result.speed, *grid, limits, colormap=SPEED, title=heading))
-            draw_bar(maps, "speed (m/s)")
+            draw_beside_truth(row, f"{name}: truth", dataset, images, ": ")
         return figure_png(figure)
+
+
+def draw_beside_truth(
+    row: Sequence[Axes], title: str, dataset: Dataset, images: Mapping[str, Made], colon: str
+) -> None:
+    """The truth of a scan under its title, and the images on its scale, ``colon`` after their names."""
+    truth = dataset.truth
+    assert truth is not None
+    limits = robust_limits([truth.sound_speed_mps])
+    drawn: dict[str, tuple[Floats, Truth | Reconstruction]] = {title: (truth.sound_speed_mps, truth)}
+    for way, made in images.items():
+        drawn[f"{way}{colon}{made.rms:.1f} m/s, {made.seconds:.0f} s"] = made.result.speed, made.result
+    maps = [
+        draw_map(axes, speed, grid.spacing_m, grid.origin_m, limits, colormap=SPEED, title=heading)
+        for axes, (heading, (speed, grid)) in zip(row, drawn.items(), strict=True)
+    ]
+    draw_bar(maps, "speed (m/s)")

@@ -8,7 +8,7 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from bentray_workers.images.canvas import drawing, new_figure
 
-from ..shared._small_png import figure_png
+from ..shared._pictures import figure_png
 from ._scaling_cluster import Run
 from ._scaling_model import BUSY, Model
 

@@ -14,7 +14,7 @@ from bentray_kernels import eikonal
 from bentray_workers.images.canvas import drawing, new_figure
 from bentray_workers.images.maps import SPEED, draw_bar, draw_map
 
-from ..shared._small_png import figure_png
+from ..shared._pictures import figure_png
 from .eikonal import Problem
 
 # Twelve colours over four decades: smooth ones would make the file too large for the repository.

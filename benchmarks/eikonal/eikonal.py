@@ -1,8 +1,8 @@
 """Goals E1 to E11: Eikonal solvers and rays against other packages."""
 
-import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from scipy.ndimage import gaussian_filter, map_coordinates
@@ -12,10 +12,9 @@ from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 
-from ._eikonal_peers import installed
+from ..shared._timing import alternate
+from ._eikonal_peers import Solver, installed
 from ._reference_times import edge_times, equation_error
-
-REPEATS = 5
 
 # Largest ring error of the one peer of first order, SimpleITK, on grad2d at 256², s.
 FIRST_ORDER_S = 1.4e-2
@@ -38,6 +37,14 @@ class Problem:
     @property
     def source(self) -> np.ndarray:
         return np.array(self.node) * self.spacing
+
+    def solve(self, *method: str, **options: int) -> np.ndarray:
+        """Times by a method of ours, s; the default one without a name."""
+        return eikonal.solve(self.speed, self.spacing, self.source, *method, **options)
+
+    def solve_by(self, peer: Solver) -> np.ndarray:
+        """Times of another package, s."""
+        return peer(self.speed, self.spacing, self.node)
 
     def ring(self, tof: np.ndarray) -> np.ndarray:
         """Errors at the receivers, s; read by cubic interpolation, whose own error is far smaller."""
@@ -82,26 +89,6 @@ def breast(n: int, refinement: int, *, sharp: bool = False) -> Problem:
     return Problem("breast sharp" if sharp else "breast", speed, spacing, node, ring, exact)
 
 
-def alternate(
-    runs: dict[str, Callable[[], object]],
-    repeats: int = REPEATS,
-    clock: Callable[[], float] = time.perf_counter,
-) -> dict[str, float]:
-    """Least time of each, s, in the order A B A B …, after one warm-up call each.
-
-    ``time.process_time`` as the clock is for runs of this process that differ by a few percent.
-    """
-    for run in runs.values():
-        run()
-    least = dict.fromkeys(runs, float("inf"))
-    for _ in range(repeats):
-        for name, run in runs.items():
-            start = clock()
-            run()
-            least[name] = min(least[name], clock() - start)
-    return least
-
-
 def rows(context: BenchmarkContext) -> Iterable[Row]:
     """E1 to E11; ``quick`` covers E1 to E5 and E7 on the small problems."""
     peers, missing = installed()
@@ -135,7 +122,7 @@ def against(
             yield Row(f"{target} {name}", None, goal, ">=", "", missing[name])
             continue
         peer = peers[name]
-        least = alternate({"ours": ours, name: lambda peer=peer: peer(p.speed, p.spacing, p.node)})
+        least = alternate({"ours": ours, name: partial(p.solve_by, peer)})
         detail = (
             f"{p.name} {p.speed.shape}: ours {least['ours'] * 1e3:.2f} ms, {name} {least[name] * 1e3:.2f} ms"
         )
@@ -145,15 +132,12 @@ def against(
 def marching(peers: dict, missing: dict, quick: bool) -> Iterable[Row]:
     """E1: heap fast marching, second order."""
     p = gradient(256, 2)
-
-    def ours() -> np.ndarray:
-        return eikonal.solve(p.speed, p.spacing, p.source, "fmm")
-
+    ours = partial(p.solve, "fmm")
     yield from against("E1 speed", peers, missing, ("scikit-fmm", "pyfmm-kit"), p, ours, 2.0)
     yield from against("E1 speed", peers, missing, ("eikonalfm",), p, ours, 1.2)
     for name in ("eikonalfm", "scikit-fmm", "pyfmm-kit"):
         if name in peers:
-            gap = float(np.abs(peers[name](p.speed, p.spacing, p.node) - ours()).max())
+            gap = float(np.abs(p.solve_by(peers[name]) - ours()).max())
             yield Row(
                 f"E1 equals {name}", gap, 1e-10, "<=", "s", "largest difference on grad2d 256², time 0.8 s"
             )
@@ -166,14 +150,10 @@ def accurate(peers: dict, missing: dict, quick: bool) -> Iterable[Row]:
     name = "eikonalfm factored"
     for n, goal in ((256, 2.5),) if quick else ((256, 2.5), (1024, 2.0)):
         p = gradient(n, 2)
-
-        def ours(p: Problem = p) -> np.ndarray:
-            return eikonal.solve(p.speed, p.spacing, p.source)
-
-        yield from against(f"E2 speed {n}²", peers, missing, (name,), p, ours, goal)
+        yield from against(f"E2 speed {n}²", peers, missing, (name,), p, p.solve, goal)
         if name in peers:
-            theirs = np.abs(p.ring(peers[name](p.speed, p.spacing, p.node))).max()
-            error = np.abs(p.ring(ours())).max()
+            theirs = np.abs(p.ring(p.solve_by(peers[name]))).max()
+            error = np.abs(p.ring(p.solve())).max()
             detail = f"largest ring error: ours {error:.2e} s, theirs {theirs:.2e} s"
             yield Row(f"E2 error {n}²", error / theirs, 1.02, "<=", "", detail)
 
@@ -185,18 +165,12 @@ def sweeping(peers: dict, missing: dict, quick: bool) -> Iterable[Row]:
         problems += [(gradient(1024, 2), 4.0), (gradient(128, 3), 4.0)]
     for p, goal in problems:
         size = f"{p.speed.shape[0]}" + {2: "²", 3: "³"}[p.speed.ndim]
-
-        def ours(p: Problem = p) -> np.ndarray:
-            return eikonal.solve(p.speed, p.spacing, p.source, "fsm")
-
+        ours = partial(p.solve, "fsm")
         yield from against(
             f"E3 {size}", peers, missing, [n for n in peers if n != "eikonalfm factored"], p, ours, goal
         )
         if size == "256²":
-            error, default = (
-                float(np.abs(p.ring(tof)).max())
-                for tof in (ours(), eikonal.solve(p.speed, p.spacing, p.source))
-            )
+            error, default = (float(np.abs(p.ring(tof)).max()) for tof in (ours(), p.solve()))
             detail = f"largest ring error, grad2d; the default solver, of second order, has {default:.1e} s"
             yield Row(f"E3 {size}, first order, error", error, FIRST_ORDER_S, "<=", "s", detail)
         for name in missing:
@@ -205,7 +179,7 @@ def sweeping(peers: dict, missing: dict, quick: bool) -> Iterable[Row]:
 
 def ray_times(p: Problem, **options: int) -> np.ndarray:
     """Travel times read as the integral of the slowness along bent rays."""
-    tof = eikonal.solve(p.speed, p.spacing, p.source, **options)
+    tof = p.solve(**options)
     return rays.travel_times(tof, p.speed, p.spacing, p.receivers, p.source)
 
 
@@ -216,7 +190,7 @@ def rms(values: np.ndarray) -> float:
 def along_rays(peers: dict, missing: dict, quick: bool) -> Iterable[Row]:
     """E4 and E5: accuracy and time with rays on the breast."""
     p = breast(256, 4 if quick else 8)
-    errors = {n: rms(p.ring(f(p.speed, p.spacing, p.node))) for n, f in peers.items()}
+    errors = {n: rms(p.ring(p.solve_by(f))) for n, f in peers.items()}
     if not errors:
         yield Row("E4 error", None, 0.5, "<=", "", "no peer is installed")
         return
@@ -224,7 +198,7 @@ def along_rays(peers: dict, missing: dict, quick: bool) -> Iterable[Row]:
     listed = ", ".join(f"{n} {e * 1e9:.1f}" for n, e in errors.items())
     ours = rms(ray_times(p) - p.exact)
     detail = f"ring rms, ns: ours {ours * 1e9:.2f}; {listed}"
-    least = alternate({"ours": lambda: ray_times(p), best: lambda: peers[best](p.speed, p.spacing, p.node)})
+    least = alternate({"ours": lambda: ray_times(p), best: partial(p.solve_by, peers[best])})
     seconds = f"ours {least['ours'] * 1e3:.1f} ms with 255 rays, {best} {least[best] * 1e3:.1f} ms without"
     # Bent rays are the high-accuracy mode: supersampling their travel time does not change the result.
     finer = rms(ray_times(p, supersample=2) - p.exact)
@@ -244,7 +218,7 @@ def batches(peers: dict, missing: dict, quick: bool) -> Iterable[Row]:
     least = alternate(
         {
             "ours": lambda: eikonal.solve_many(p.speed[None], p.spacing, sources, "fsm"),
-            "peer": lambda: peers["scikit-fmm"](p.speed, p.spacing, p.node),
+            "peer": partial(p.solve_by, peers["scikit-fmm"]),
         }
     )
     each = least["ours"] / len(sources)
@@ -263,7 +237,7 @@ def batches(peers: dict, missing: dict, quick: bool) -> Iterable[Row]:
 def tracing(peers: dict, missing: dict, quick: bool) -> Iterable[Row]:
     """E6: 255 rays, how straight they are, and the sensitivities."""
     p = breast(256, 4)
-    tof = eikonal.solve(p.speed, p.spacing, p.source)
+    tof = p.solve()
     paths = rays.trace(tof, p.spacing, p.receivers, p.source)
     lost = sum(not np.allclose(path[-1], p.source) for path in paths)
     yield Row("E6 lost rays", lost, 0, "<=", "", "of 255, breast 256²")
@@ -331,14 +305,10 @@ def threads(peers: dict, missing: dict, quick: bool) -> Iterable[Row]:
 def three_dimensions(peers: dict, missing: dict, quick: bool) -> Iterable[Row]:
     """E9: factored second order, 128³."""
     p, name = gradient(128, 3), "eikonalfm factored"
-
-    def ours() -> np.ndarray:
-        return eikonal.solve(p.speed, p.spacing, p.source)
-
-    yield from against("E9 speed", peers, missing, (name,), p, ours, 2.0)
+    yield from against("E9 speed", peers, missing, (name,), p, p.solve, 2.0)
     if name in peers:
-        theirs = np.abs(p.ring(peers[name](p.speed, p.spacing, p.node))).max()
-        error = np.abs(p.ring(ours())).max()
+        theirs = np.abs(p.ring(p.solve_by(peers[name]))).max()
+        error = np.abs(p.ring(p.solve())).max()
         yield Row(
             "E9 error",
             error / theirs,
@@ -356,7 +326,7 @@ def sharp_edges(peers: dict, missing: dict, quick: bool) -> Iterable[Row]:
     if "fteikpy" not in peers:
         yield Row("E10 sharp edges", None, 1.0, "<=", "", missing["fteikpy"])
         return
-    theirs = rms(p.ring(peers["fteikpy"](p.speed, p.spacing, p.node)))
+    theirs = rms(p.ring(p.solve_by(peers["fteikpy"])))
     detail = f"ring rms: ours along rays {error * 1e9:.0f} ns, fteikpy {theirs * 1e9:.0f} ns"
     yield Row("E10 sharp edges", error / theirs, 1.0, "<=", "", detail)
 

@@ -35,7 +35,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         context.progress(k, len(makers) + 1, make.__name__.replace("_case", ""))
         p, case = make(nodes, names)
         cases.append(case)
-        first = p.ring(eikonal.solve(p.speed, p.spacing, p.source, "fmm", order=1))
+        first = p.ring(p.solve("fmm", order=1))
         for name in eikonal.methods():
             yield from errors(case, name, first)
     context.progress(len(makers), len(makers) + 1, "picture")
@@ -79,5 +79,5 @@ def gradient_case(nodes: int, names: Iterable[str]) -> tuple[Problem, Case]:
 
 def solved(p: Problem, names: Iterable[str], true: np.ndarray) -> dict[str, Solved]:
     """Each method's times, their error at every node and at the ring."""
-    times = {name: eikonal.solve(p.speed, p.spacing, p.source, name) for name in names}
+    times = {name: p.solve(name) for name in names}
     return {name: Solved(time, np.abs(time - true), p.ring(time)) for name, time in times.items()}

@@ -5,6 +5,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,8 @@ from bentray_kernels import eikonal
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 
-from .eikonal import Problem, gradient
+from ..shared._timing import least_seconds
+from .eikonal import gradient
 
 # Nodes along a side, by dimensions.
 SIDES = {2: (64, 128, 256, 512, 1024, 2048), 3: (32, 48, 64, 96, 128, 192)}
@@ -24,9 +26,6 @@ MIN_NODES_FOR_MEMORY = 200_000
 
 EXPONENT_GOAL = 1.15
 BYTES_GOAL = 200.0
-
-# A grid is solved until so much time has passed, and twice at least: the first solve of a size may be late.
-MIN_SECONDS = 0.5
 
 
 def rows(context: BenchmarkContext) -> Iterable[Row]:
@@ -45,27 +44,14 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
 
 def growth_of_time(name: str, ndim: int, sides: tuple[int, ...]) -> Row:
     """The exponent of time against nodes, by least squares of the logarithms."""
-    small = gradient(32, ndim)
-    eikonal.solve(small.speed, small.spacing, small.source, name)
-    seconds = [least_seconds(gradient(n, ndim), name) for n in sides]
+    gradient(32, ndim).solve(name)
+    # Processor time, which does not depend on the load of the machine.
+    seconds = [least_seconds(partial(gradient(n, ndim).solve, name), time.process_time) for n in sides]
     nodes = [n**ndim for n in sides]
     exponent = float(np.polyfit(np.log(nodes), np.log(seconds), 1)[0])
     each = listed(sides, ndim, [1e9 * s / n for s, n in zip(seconds, nodes, strict=True)])
     detail = f"processor time, ns a node: {each}"
     return Row(f"{name} {ndim}-D time", exponent, EXPONENT_GOAL, "<=", "exponent", detail)
-
-
-def least_seconds(p: Problem, name: str) -> float:
-    """Least time of two or more solves that together take ``MIN_SECONDS``.
-
-    It is CPU time, which does not depend on the load of the machine.
-    """
-    taken: list[float] = []
-    while len(taken) < 2 or sum(taken) < MIN_SECONDS:
-        start = time.process_time()
-        eikonal.solve(p.speed, p.spacing, p.source, name)
-        taken.append(time.process_time() - start)
-    return min(taken)
 
 
 def growth_of_memory(name: str, ndim: int, sides: tuple[int, ...]) -> Row:

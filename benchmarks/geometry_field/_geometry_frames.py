@@ -12,7 +12,7 @@ from bentray_kernels.geometry_field.tracing.ray_tracer_opencl import OpenCLTrace
 from bentray_kernels.opencl import OpenCLFallbackWarning
 from bentray_service.cli.output.benchmark_row import Row
 
-from ..eikonal.eikonal import alternate
+from ..shared._timing import alternate
 from ._geometry_scenes import SCENES
 
 PIXELS = 512

@@ -20,7 +20,7 @@ from bentray_kernels.meshes.mesh import TriangleMesh
 from bentray_kernels.meshes.surface import Surface, surface_of
 from bentray_service.cli.output.benchmark_row import Row
 
-from ..eikonal.eikonal import alternate
+from ..shared._timing import alternate
 from ._field_rays import build_outer_field, load_mesh
 
 # The published ones, ours, and exact intersection.

@@ -7,7 +7,7 @@ from bentray_kernels.geometry_field.layout.parameterisation import parameterise
 from bentray_kernels.refraction import perspective
 from bentray_kernels.refraction.supersampling import averaged
 
-from ..shared._contact_sheet import Panel
+from ..shared._pictures import Panel
 from ._field_lookups import PIXELS, SAMPLES, Lookups, between_pixels
 from ._field_rays import load_mesh
 

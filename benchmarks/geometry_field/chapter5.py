@@ -14,7 +14,7 @@ from bentray_kernels.refraction.supersampling import averaged
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 
-from ..shared._contact_sheet import Panel, sheet
+from ..shared._pictures import Panel, sheet
 from ._geometry_scenes import SCENES, glass, self_reflection
 from ._inner_lookups import inner_rows
 from ._lookup_figure import lookup_panels

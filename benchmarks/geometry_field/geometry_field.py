@@ -13,8 +13,8 @@ from bentray_kernels.meshes.surface import surface_of
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 
-from ..eikonal.eikonal import alternate
 from ..shared._available import available
+from ..shared._timing import alternate
 from ._field_lookups import PIXELS, SAMPLES, Lookups, between_pixels
 from ._field_rays import build_outer_field, camera_rays, incoherent_rays, load_mesh
 from ._geometry_frames import rows as frame_rows

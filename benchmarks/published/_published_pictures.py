@@ -24,10 +24,10 @@ from bentray_kernels.refraction import (
 )
 from bentray_service.cli.output.benchmark_row import Row
 
-from ..eikonal.eikonal import alternate
 from ..geometry_field._field_rays import build_outer_field
 from ..geometry_field._geometry_scenes import landscape
 from ..refraction._glass import BEHIND, DOWN, FRONT, RIGHT, ball, glass, waves
+from ..shared._timing import alternate
 
 FACES, SAMPLES, IMAGE = 20_000, 24, 513
 SQUARES, SMOOTH = 24, "B-spline 3, smooth λ = 1"

@@ -8,7 +8,7 @@ from bentray_kernels import eikonal, rays
 from bentray_kernels.requests.names import RayGradient
 from bentray_service.cli.output.benchmark_row import Row
 
-from ..eikonal.eikonal import alternate
+from ..shared._timing import alternate
 
 # In the unit square; rays are arcs about centres on x = −1/4, where the speed would be 0.
 SOURCE = np.array([0.2, 0.1])

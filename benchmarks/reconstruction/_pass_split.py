@@ -1,6 +1,5 @@
 """Where one emitter's pass of SART over a slice spends its time: wave front, rays, update."""
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -11,6 +10,8 @@ from bentray_kernels.eikonal.deviation import deviate
 from bentray_kernels.phantoms import TABLE7_SIDE_M, table7
 from bentray_kernels.tomography.sart.emitter_pass import EmitterPass
 from bentray_workers.simulation.plane import Ring, ring_radius
+
+from ..shared._timing import alternate
 
 REPEATS = 60
 
@@ -60,18 +61,6 @@ def split(nodes: int, elements: int) -> Split:
     def update() -> None:
         work.update(slowness.copy(), coverage, region, spacing, 0.1, 1.0, (1e-4, 1e-3))
 
-    both, first, last = least(look, front, update)
+    runs: dict[str, Callable[[], object]] = {"both": look, "front": front, "update": update}
+    both, first, last = alternate(runs, REPEATS).values()
     return Split(first, both - first, last)
-
-
-def least(*runs: Callable[[], None]) -> list[float]:
-    """Seconds of the fastest run of each, in turn, after one that compiles."""
-    seconds = []
-    for _ in range(REPEATS + 1):
-        took = []
-        for run in runs:
-            started = time.perf_counter()
-            run()
-            took.append(time.perf_counter() - started)
-        seconds.append(took)
-    return [min(of_one) for of_one in zip(*seconds[1:], strict=True)]

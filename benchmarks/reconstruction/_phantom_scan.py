@@ -27,19 +27,16 @@ class ReconstructionError:
     Attributes:
         result: the reconstruction.
         mae_percent: mean absolute error of the speed inside the breast, per cent of its range (Li 2008, 6.4).
-        rmse_of_range: root mean square error of the speed inside the breast, as a fraction of its range.
-        whole_image_rmse: as ``rmse_of_range``, over the whole image, as in Li 2008, section 7.3.1.
-        attenuation_rmse: as ``rmse_of_range``, of the attenuation; NaN without one.
-        seconds: computing time.
+        whole_image_rmse: root mean square error of the speed over the whole image, as a fraction of its range
+            inside the breast (Li 2008, section 7.3.1).
+        attenuation_rmse: of the attenuation inside the breast, as a fraction of its range; NaN without one.
         how: summary for the detail of a row.
     """
 
     result: Reconstruction
     mae_percent: float
-    rmse_of_range: float
     whole_image_rmse: float
     attenuation_rmse: float
-    seconds: float
     how: str
 
     @property
@@ -133,10 +130,8 @@ class PhantomScan:
         return ReconstructionError(
             result,
             self.mean_absolute(result).of(result),
-            self.rms(result).of(result),
             self.whole_image_rms(result).of(result),
             self.attenuation_rms(result).of(result),
-            image.seconds,
             how,
         )
 

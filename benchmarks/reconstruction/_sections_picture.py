@@ -10,7 +10,7 @@ from bentray_kernels.tomography import Reconstruction
 from bentray_workers.images.canvas import drawing, new_figure
 from bentray_workers.images.maps import SPEED, draw_bar, draw_map, robust_limits
 
-from ..shared._small_png import figure_png
+from ..shared._pictures import figure_png
 
 
 @dataclass(frozen=True)

@@ -9,14 +9,13 @@ import numpy as np
 from bentray_kernels.acquisition import Dataset, pick
 from bentray_kernels.acquisition.noise import with_noise
 from bentray_kernels.phantoms import DetailedBreast, EllipsePhantom
-from bentray_kernels.tomography import Problem, Reconstruction
-from bentray_kernels.tomography.comparison import on_grid
+from bentray_kernels.tomography import Reconstruction
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_workers.simulation.plane import SimulationSettings
 from bentray_workers.simulation.simulation_run import simulate
 from bentray_workers.simulation.waves import WaveSimulationSettings
 
-from ..any_scan._any_array import arrays, simulated
+from ..any_scan._any_array import arrays, hull_error, simulated
 from ..shared._image_error import ErrorOn, ImageError, object_error
 from ..uncertainty._breast_scans import breast_scans
 
@@ -60,7 +59,7 @@ def unseen_scans(context: BenchmarkContext) -> Iterator[UnseenScan]:
         random, delta = np.random.default_rng((SEED, number)), exact.differential_tof()
         noisy, _ = with_noise(delta, ARRAY_SNR, random, np.isfinite(delta) & (delta != 0.0))
         dataset = replace(exact, delta_tof_s=noisy)
-        yield UnseenScan(f"{name}, SNR {ARRAY_SNR:g}", dataset, _inside_array(dataset))
+        yield UnseenScan(f"{name}, SNR {ARRAY_SNR:g}", dataset, hull_error(dataset))
     for waves in WAVES:
         name = f"picks at {1e-3 * waves.frequency_hz:g} kHz, water {waves.coupling_mps:g} m/s, SNR 20"
         recorded = simulate(waves, lambda now, n=name: context.progress(now.done, now.total, n))
@@ -77,17 +76,5 @@ def _inside(phantom: DetailedBreast | EllipsePhantom) -> ErrorOn:
         nodes = image.speed.shape[0]
         side = image.spacing_m[0] * (nodes - 1)
         return ImageError(phantom.speed(nodes, side), phantom.inside(nodes, side))
-
-    return error_on
-
-
-def _inside_array(dataset: Dataset) -> ErrorOn:
-    """Root mean square error inside the hull of the array, m/s."""
-    truth = dataset.truth
-    assert truth is not None
-
-    def error_on(image: Reconstruction) -> ImageError:
-        true = on_grid(truth.sound_speed_mps, truth, image)
-        return ImageError(true, Problem.from_dataset(dataset, image.settings).region & np.isfinite(true))
 
     return error_on

@@ -11,7 +11,7 @@ from bentray_service.cli.output.benchmark_row import Row
 from bentray_workers.images.canvas import drawing, new_figure
 from bentray_workers.images.maps import ATTENUATION, SPEED, draw_bar, draw_map, robust_limits
 
-from ..shared._small_png import figure_png
+from ..shared._pictures import figure_png
 
 WATER_MPS, FAT_MPS = 1500.0, 1375.0
 

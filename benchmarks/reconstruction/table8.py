@@ -1,7 +1,6 @@
 """Table 8 of the dissertation, the two rows of one projection: their times and ours."""
 
-import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,11 +11,10 @@ from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 
+from ..shared._timing import least_seconds
+
 SOURCES = 64
 SIDES = (128, 256)
-
-# A projection is timed until so many seconds have passed, and more than once.
-MIN_SECONDS = 0.5
 
 
 @dataclass(frozen=True)
@@ -99,17 +97,6 @@ def measured(name: str, nodes: int) -> Figures:
         return Figures(alone, None)
     together = least_seconds(lambda: eikonal.solve_many(speed[None], spacing, ring, name))
     return Figures(alone, together / SOURCES)
-
-
-def least_seconds(run: Callable[[], object]) -> float:
-    """Least seconds of one run, after one that is not counted."""
-    run()
-    taken: list[float] = []
-    while len(taken) < 2 or sum(taken) < MIN_SECONDS:
-        start = time.perf_counter()
-        run()
-        taken.append(time.perf_counter() - start)
-    return min(taken)
 
 
 def opencl() -> tuple[str, str]:

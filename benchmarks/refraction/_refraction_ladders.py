@@ -22,7 +22,7 @@ from bentray_kernels.refraction import (
 from bentray_kernels.splines import Spline
 from bentray_service.cli.output.benchmark_row import Row
 
-from ..eikonal.eikonal import alternate
+from ..shared._timing import alternate
 from ._refracting_ball import RIM_RADIUS, WIDTH, board, camera, eight_bit
 
 # Not part of the project: lies beside a checkout where somebody has put it.

@@ -13,7 +13,7 @@ from bentray_kernels.splines import Spline
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 
-from ..eikonal.eikonal import alternate
+from ..shared._timing import alternate
 from ._refracting_ball import board, camera, scene, signed_distance
 
 PIXELS = 512

@@ -6,7 +6,7 @@ from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
 
-from ..shared._contact_sheet import Panel, sheet
+from ..shared._pictures import Panel, sheet
 from ._glass import FILTERS, ball, drawn, glass, lit, rings, slanted
 
 # Milliseconds under the pictures of Figure 8: nine rays a pixel, and post-refraction supersampling.

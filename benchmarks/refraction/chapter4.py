@@ -20,8 +20,8 @@ from bentray_kernels.refraction import (
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 
-from ..eikonal.eikonal import alternate
-from ..shared._contact_sheet import Panel, sheet
+from ..shared._pictures import Panel, sheet
+from ..shared._timing import alternate
 from ._glass import BEHIND, DOWN, REPEATS, RIGHT, ball, breast, drawn, glass, hills, waves
 from ._octree_counts import rows as operation_rows
 from ._refraction_ladders import cells, filters, ladder, subjects

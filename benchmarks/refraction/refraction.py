@@ -12,8 +12,8 @@ from bentray_kernels.splines import Spline
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 
-from ..eikonal.eikonal import alternate
 from ..shared._available import available
+from ..shared._timing import alternate
 from ._refracting_ball import (
     DISTANCE_RADIUS,
     RIM_RADIUS,

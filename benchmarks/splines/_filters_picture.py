@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from bentray_kernels.splines import Spline
 from bentray_workers.images.canvas import drawing, new_figure
 
-from ..shared._small_png import figure_png
+from ..shared._pictures import figure_png
 
 # A node of 1 on a long line, read so often between two nodes.
 NODES, FINE = 257, 32

@@ -9,7 +9,7 @@ from bentray_kernels.splines import Spline
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 
-from ..eikonal.eikonal import alternate
+from ..shared._timing import alternate
 from ._filters_picture import picture
 from ._gradient_angles import BALL_NODES, RINGS_NODES, RINGS_RADIUS, ball, rings
 from ._spline_peers import installed

@@ -9,7 +9,7 @@ from bentray_workers.images.canvas import drawing, new_figure
 from bentray_workers.images.captions import LABELS
 from bentray_workers.images.maps import SPEED, UNCERTAINTY, draw_bar, draw_map, robust_limits
 
-from ..shared._small_png import figure_png
+from ..shared._pictures import figure_png
 from ._judged_image import Judged, relative
 
 SHADOW, OTHER, CAUTION = "#c1272d", "#1f5fa8", "#9aa7b5"

@@ -4,12 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bentray_kernels.arrays import Flags, Floats
 from bentray_kernels.tomography import Reconstruction
 from bentray_service.cli.output.benchmark_row import Row
-
-Floats = NDArray[np.float64]
 
 # Within so many standard deviations nodes are counted.
 DEVIATIONS = 2.0
@@ -32,7 +30,7 @@ class Judged:
     result: Reconstruction
     error: Floats
     deviation: Floats
-    breast: NDArray[np.bool_]
+    breast: Flags
     image_s: float
     uncertainty_s: float
 
@@ -61,15 +59,24 @@ def row_of(target: str, error: Floats, deviation: Floats, goal: float, about: st
         goal: at least this part.
         about: the scans.
     """
-    sizes = [np.sqrt(float((values**2).mean())) for values in (error, deviation)]
     return Row(
         f"{target}, nodes within two deviations",
         float(np.mean(error <= DEVIATIONS * deviation)),
         goal,
         ">=",
         "",
-        f"{about}; {error.size} nodes in the breast; error {sizes[0]:.1f} m/s, deviations {sizes[1]:.1f} m/s",
+        f"{about}; {error.size} nodes in the breast; {sizes(error, deviation)}",
     )
+
+
+def sizes(error: Floats, deviation: Floats) -> str:
+    """Root mean squares of errors and of deviations, in words."""
+    return f"error {rms(error):.1f} m/s, deviations {rms(deviation):.1f} m/s"
+
+
+def rms(values: Floats) -> float:
+    """Root mean square."""
+    return float(np.sqrt((values**2).mean()))
 
 
 def relative(judged: Judged) -> Floats:

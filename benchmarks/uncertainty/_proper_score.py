@@ -9,7 +9,7 @@ from scipy.special import ndtr
 from bentray_kernels.arrays import Floats
 from bentray_service.cli.output.benchmark_row import Row
 
-from ._judged_image import DEVIATIONS, Judged
+from ._judged_image import DEVIATIONS, Judged, sizes
 
 # Of the best constant's score; and the least and the largest part of the nodes within two deviations.
 SCORE, COVERED, NOT_MORE = 0.8, 0.85, 0.985
@@ -63,7 +63,6 @@ def _compared(where: str, nodes: Sequence[tuple[Floats, Floats]], about: str) ->
     error, deviation = (np.concatenate(parts) for parts in zip(*nodes, strict=True))
     constant, least = best_constant(error)
     known = float(score(error, OF_KNOWN_ERROR * np.maximum(np.abs(error), 1e-9)).mean())
-    sizes = [float(np.sqrt((values**2).mean())) for values in (error, deviation)]
     return Row(
         f"U2 CRPS of the deviations over that of the best constant, nodes {where}",
         float(score(error, deviation).mean()) / least,
@@ -72,6 +71,6 @@ def _compared(where: str, nodes: Sequence[tuple[Floats, Floats]], about: str) ->
         "",
         f"{about}; {error.size} nodes; best constant {constant:.1f} m/s, its CRPS {least:.2f} m/s; "
         f"deviations made of the errors themselves would have {known / least:.2f}; "
-        f"{100.0 * np.mean(np.abs(error) <= DEVIATIONS * deviation):.0f} % within two deviations; error "
-        f"{sizes[0]:.1f} m/s, deviations {sizes[1]:.1f} m/s",
+        f"{100.0 * np.mean(np.abs(error) <= DEVIATIONS * deviation):.0f} % within two deviations; "
+        f"{sizes(error, deviation)}",
     )

@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from bentray_kernels.acquisition import Dataset
@@ -20,12 +19,10 @@ from bentray_service.cli.output.benchmark_row import Row
 
 from ._breast_scans import SEED, BreastScan, breast_scans
 from ._calibration_picture import calibration_picture
-from ._judged_image import DEVIATIONS, Judged, correlation, part_within, row_of
+from ._judged_image import DEVIATIONS, Judged, correlation, part_within, rms, row_of, sizes
 from ._proper_score import score_rows
 from ._small_volume import small_volume
 from .uncertainty_waveform import beside_truth, wave_scans
-
-Floats = NDArray[np.float64]
 
 # None of the scans chose the deviations. One deviation for all nodes is chosen with the first half of the
 # scans, so that nine tenths of their nodes lie within two, and is compared on the others.
@@ -75,7 +72,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         PART,
         ">=",
         "",
-        f"{least.name}; {in_words(least)}",
+        f"{least.name}; {sizes(*least.in_breast)}",
     )
     yield from cautions(judged)
     correlations = [correlation(image) for image in judged]
@@ -145,8 +142,8 @@ def slow_water(context: BenchmarkContext) -> Iterable[Row]:
         PART,
         ">=",
         "",
-        f"{len(judged)} other breasts; {in_words(least)}; {each}; rank correlation of deviation and error "
-        f"at least {min(correlations):.2f}",
+        f"{len(judged)} other breasts; {sizes(*least.in_breast)}; {each}; rank correlation of deviation and "
+        f"error at least {min(correlations):.2f}",
     )
 
 
@@ -213,14 +210,3 @@ def constant_deviation(judged: Sequence[Judged]) -> float:
     """One deviation for all nodes with ``CHOSEN_PART`` of them within ``DEVIATIONS``, m/s."""
     errors = np.abs(np.concatenate([image.in_breast[0] for image in judged]))
     return float(np.quantile(errors, CHOSEN_PART)) / DEVIATIONS
-
-
-def rms(values: Floats) -> float:
-    """Root mean square."""
-    return math.sqrt(float((values**2).mean()))
-
-
-def in_words(image: Judged) -> str:
-    """Error and deviations of an image in the breast."""
-    error, deviation = map(rms, image.in_breast)
-    return f"error {error:.1f} m/s, deviations {deviation:.1f} m/s"

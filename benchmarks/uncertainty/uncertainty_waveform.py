@@ -1,6 +1,5 @@
 """U1: standard deviations of full-waveform images hold on breasts that chose no parameter, and their time."""
 
-import math
 import os
 import time
 from collections.abc import Iterable, Iterator
@@ -19,6 +18,7 @@ from bentray_service.cli.output.benchmark_row import Row
 from ..shared._recorded_scans import with_trace_noise
 from ..shared._ring_scan import RingScan
 from ._breast_scans import detailed
+from ._judged_image import sizes
 
 # Half the size of a breast; the ratio of breast and wavelength is that of 75 kHz at full size.
 SIDE_M, RADIUS_M, CENTRE_HZ, ELEMENTS, EMISSIONS, WATER_MPS = 0.12, 0.054, 1.5e5, 64, 32, 1500.0
@@ -49,9 +49,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         ">=",
         "",
         f"{len(details)} scans of {EMISSIONS} emitters at {1e-3 * CENTRE_HZ:.0f} kHz, nodes in the breast; "
-        f"{each}; "
-        f"{100.0 * np.mean(error <= deviation):.0f} % within one; error {rms(error):.1f} m/s, deviations "
-        f"{rms(deviation):.1f} m/s",
+        f"{each}; {100.0 * np.mean(error <= deviation):.0f} % within one; {sizes(error, deviation)}",
     )
     yield Row(
         "U1 full waveform, time of image and uncertainty over that of the image",
@@ -96,8 +94,3 @@ def beside_truth(scan: Dataset, result: Reconstruction) -> tuple[Floats, Floats]
     inside &= spread > 0.0
     true = map_coordinates(smooth, points, order=1, mode="nearest")
     return np.abs(result.speed - true)[inside], spread[inside]
-
-
-def rms(values: Floats) -> float:
-    """Root mean square."""
-    return math.sqrt(float((values**2).mean()))

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 
 from bentray_workers.images.canvas import drawing, new_figure
 
-from ..shared._small_png import figure_png
+from ..shared._pictures import figure_png
 from ._wave_shots import CENTRE_HZ, WATER_MPS, Shot, delays, misfit
 
 OURS, THEIRS, LEFT, STATED = "#d1495b", "#9db4c0", "#00798c", "#444444"

@@ -2,13 +2,14 @@
 
 import os
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 import numpy as np
 
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 
+from ..shared._timing import alternate
 from ._kwave_peer import Peer, installed, padded
 from ._wave_picture import picture
 from ._wave_shots import MEDIA, Shot, delays, misfit
@@ -76,14 +77,10 @@ def judged(
 
 def timed(label: str, shot: Shot, peer: Peer) -> Row:
     """Ours over theirs, each for the nodes of its own grid, in turns, the quickest of each."""
-    runs: tuple[Callable[[], object], ...] = (shot.ours, lambda: shot.theirs(peer, 1))
+    runs = {"ours": shot.ours, "theirs": lambda: shot.theirs(peer, 1)}
     grids = shot.medium.keep.size, padded(shot.nodes) ** 2
-    least = [np.inf, np.inf]
-    for _ in range(TURNS):
-        for k, run in enumerate(runs):
-            begun = time.process_time()
-            run()
-            least[k] = min(least[k], (time.process_time() - begun) / (shot.time.size * grids[k]))
+    seconds = alternate(runs, TURNS, time.process_time).values()
+    least = [taken / (shot.time.size * grid) for taken, grid in zip(seconds, grids, strict=True)]
     told = (
         f"{1e9 * least[0]:.2f} ns against {1e9 * least[1]:.1f} ns of one core, {grids[0]} and {grids[1]} "
         f"nodes, float32, theirs with SciPy's transforms; load {os.getloadavg()[0]:.1f}"
