@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from bentray_kernels.acquisition import Dataset, Truth
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.atomic import atomic_replace
-from bentray_workers.files.dataset import read_dataset
-from bentray_workers.files.dataset.scan import trace_samples
+from bentray_workers.files.dataset.scan import read_header
 
 from ..html_tables import figures_html
 
@@ -47,8 +46,9 @@ class Scan:
         """
         self.path = path
         self.name = name
-        self.dataset: Dataset = read_dataset(path, traces=False)
-        self.samples = trace_samples(path)
+        header = read_header(path, estimate=False)
+        self.dataset: Dataset = header.dataset
+        self.samples = header.samples
 
     @property
     def title(self) -> str:

@@ -17,8 +17,7 @@ from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.requests.names import DEFAULT_PICKER
 
-from ..files.dataset import read_dataset
-from ..files.dataset.scan import lacks_water, measured_frequency, open_slice, trace_samples
+from ..files.dataset.scan import measured_frequency, open_slice, read_header
 from ..files.dataset.units import propose
 
 # Elements of a drawing, and receivers and samples of the traces of a view; of more, every n-th is taken.
@@ -36,7 +35,8 @@ def scan_geometry(path: Path, *, water_temperature_c: float | None = None) -> di
         InvalidInput: as ``read_dataset``.
     """
     # Also of a scan that an earlier version took, and that the checks of today would refuse.
-    recorded = read_dataset(path, traces=False, plausible=False)
+    header = read_header(path, plausible=False, estimate=False)
+    recorded = header.dataset
     scan = recorded.in_water_of(water_temperature_c)
     measured = measured_frequency(path)
     frequency = scan.center_frequency_hz or measured
@@ -56,8 +56,8 @@ def scan_geometry(path: Path, *, water_temperature_c: float | None = None) -> di
         "frequency_estimated": frequency is not None and scan.center_frequency_hz is None,
         "sampling_rate_hz": scan.sampling_rate_hz,
         "t0_s": scan.t0_s,
-        "samples": trace_samples(path),
-        "water_shot": trace_samples(path) > 0 and not lacks_water(path),
+        "samples": header.samples,
+        "water_shot": header.samples > 0 and not header.lacks_water,
         "water_speed_mps": scan.water_speed_mps,
         "water_temperature_c": scan.water_temperature_c,
         "water_assumed": scan.water_temperature_assumed,
@@ -90,13 +90,14 @@ def emission_traces(
     Raises:
         InvalidInput: naming ``emission``, ``slice`` or ``quantity``; as ``read_dataset``.
     """
-    scan = read_dataset(path, traces=False).in_water_of(water_temperature_c)
+    header = read_header(path, estimate=False)
+    scan = header.dataset.in_water_of(water_temperature_c)
     for name, value, count in (("emission", emission, len(scan.tx)), ("slice", index, scan.slices)):
         if not 0 <= value < count:
             raise InvalidInput(name, value, f"0 to {count - 1}")
     # The picker alone needs it; its estimate reads traces of other emissions too.
     frequency = (
-        None if scan.picked or lacks_water(path) else scan.center_frequency_hz or measured_frequency(path)
+        None if scan.picked or header.lacks_water else scan.center_frequency_hz or measured_frequency(path)
     )
     with open_slice(path, scan, index) as dataset:
         traces = None if dataset.waveform is None else getattr(dataset.waveform, what)

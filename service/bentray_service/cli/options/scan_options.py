@@ -82,9 +82,8 @@ def dataset_file(source: Path, given: ScanMetadata, folder_of: Path) -> Iterator
 def checked_dataset(scan: Path, settings: Settings) -> Dataset:
     """A dataset file without its traces; raises InvalidInput unless it has what the settings require."""
     from bentray_kernels.tomography.requirements import check_scan
-    from bentray_workers.files.dataset import read_dataset
-    from bentray_workers.files.dataset.scan import trace_samples
+    from bentray_workers.files.dataset.scan import read_header
 
-    dataset = read_dataset(scan, traces=False)
-    check_scan(dataset, settings, trace_samples(scan))
-    return dataset
+    header = read_header(scan, estimate=False)
+    check_scan(header.dataset, settings, header.samples)
+    return header.dataset

@@ -26,7 +26,7 @@ class ScanHeader(NamedTuple):
     """Facts about a scan without its traces.
 
     Attributes:
-        dataset: without traces; a missing centre frequency is estimated from them.
+        dataset: without traces; a missing centre frequency may be estimated from them.
         samples: of each trace of the object; 0 without traces.
         lacks_water: whether there are traces of the object, but no water shot.
         spectrum: of the pulse, where the frequency was estimated.
@@ -38,21 +38,26 @@ class ScanHeader(NamedTuple):
     spectrum: PulseSpectrum | None
 
 
-def read_header(path: Path, *, plausible: bool = True) -> ScanHeader:
+def read_header(path: Path, *, plausible: bool = True, estimate: bool = True) -> ScanHeader:
     """Facts in a file about a scan, read at one opening.
 
     Args:
         path: of the HDF5 file.
         plausible: as ``read_dataset`` takes it.
+        estimate: whether to estimate a missing centre frequency, which reads traces.
 
     Raises:
         InvalidInput: as ``read_dataset``, and for traces without a pulse where the frequency is missing.
     """
     with opened(path) as reader:
         dataset, spectrum = dataset_of(reader, None, plausible=plausible), None
-        if dataset.center_frequency_hz is None:
+        if estimate and dataset.center_frequency_hz is None:
             spectrum = _spectrum(reader, stacked=dataset.slice_z_m is not None)
-        samples, lacking = _samples(reader), _lacks_water(reader)
+        received, water = (
+            reader.checked(f"waveform/{name}", NUMERIC, TRACES) for name in ("object", "water")
+        )
+        samples = 0 if received is None else int(received.shape[-1])
+        lacking = received is not None and water is None
     if spectrum is not None:
         dataset = replace(dataset, center_frequency_hz=spectrum.center_frequency_hz)
     return ScanHeader(dataset, samples, lacking, spectrum)
@@ -65,18 +70,6 @@ def measured_frequency(path: Path) -> float | None:
         spectrum = _spectrum(reader, stacked=reader.has("slice/z_m"))
         return None if spectrum is None else spectrum.center_frequency_hz
     return None
-
-
-def trace_samples(path: Path) -> int:
-    """Samples of each trace of a dataset file; 0 without traces of the object."""
-    with opened(path) as reader:
-        return _samples(reader)
-
-
-def lacks_water(path: Path) -> bool:
-    """Whether a dataset file has traces of the object, but no water shot."""
-    with opened(path) as reader:
-        return _lacks_water(reader)
 
 
 def counts_in(path: Path) -> DatasetCounts:
@@ -150,13 +143,3 @@ def _spectrum(reader: Reader, *, stacked: bool) -> PulseSpectrum | None:
     rate = reader.number("acquisition", "sampling_rate_hz", "Hz")
     traces = emissions_in(reader, "waveform/object", index=0 if stacked else None)
     return None if traces is None or rate is None else estimate_spectrum(traces, rate)
-
-
-def _lacks_water(reader: Reader) -> bool:
-    stored = [reader.checked(f"waveform/{name}", NUMERIC, TRACES) for name in ("object", "water")]
-    return stored[0] is not None and stored[1] is None
-
-
-def _samples(reader: Reader) -> int:
-    received = reader.checked("waveform/object", NUMERIC, TRACES)
-    return 0 if received is None else int(received.shape[-1])
