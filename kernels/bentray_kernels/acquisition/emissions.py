@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,7 @@ class Emissions:
     emission: Ints
     reception: Ints
     inverted: Flags
+    ndim: ClassVar[int] = 3
 
     @classmethod
     def from_reader(
@@ -45,10 +46,6 @@ class Emissions:
     @property
     def shape(self) -> tuple[int, int, int]:
         return len(self.emission), len(self.reception), self.samples
-
-    @property
-    def ndim(self) -> int:
-        return 3
 
     def __len__(self) -> int:
         return len(self.emission)

@@ -32,18 +32,6 @@ class Machine(Protocol):
         """Blocks into which a volume is cut, and why."""
 
 
-class ThisProcess:
-    """The machine of a reconstruction in this process."""
-
-    def device(self, size: ScanSize, settings: Settings) -> tuple[str, str]:
-        """See ``Machine``."""
-        return choose_device(size, settings)
-
-    def blocks(self, dataset: Dataset, settings: Settings) -> tuple[int, str]:
-        """See ``Machine``: in the memory of one process there is no need for blocks."""
-        return settings.numerics.blocks, ""
-
-
 class Waves(NamedTuple):
     """The full-waveform refinement that may follow an image.
 
@@ -85,7 +73,7 @@ def settled(source: Source, settings: Settings, machine: Machine | None = None) 
     Raises:
         InvalidInput: for a setting that does not fit the scan, and a requested device of which there is none.
     """
-    dataset, here = source.dataset(), machine or ThisProcess()
+    dataset = source.dataset()
     reasons = {"water": _water(dataset, settings)}
     decomposition, nodes = settings.decomposition, settings.nodes
     if decomposition is None:
@@ -97,10 +85,11 @@ def settled(source: Source, settings: Settings, machine: Machine | None = None) 
     sized = settings.changed(decomposition=decomposition, nodes=nodes)
     pairs.count(dataset, sized)
     size = ScanSize(dataset.slices, len(dataset.tx), len(dataset.rx), source.samples)
-    device, why = here.device(size, sized)
+    device, why = machine.device(size, sized) if machine else choose_device(size, sized)
     if why:
         reasons["device"] = f"{'OpenCL' if device == 'opencl' else 'compiled code'}, {why}"
-    blocks, why = here.blocks(dataset, sized)
+    # In the memory of one process there is no need for blocks.
+    blocks, why = machine.blocks(dataset, sized) if machine else (settings.numerics.blocks, "")
     if why:
         reasons["blocks"] = f"{blocks}, {why}"
     chosen = sized.changed(device=device, blocks=blocks)

@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...arrays import Floats
 from ...errors import InvalidInput
@@ -125,7 +124,9 @@ def spectral_ratio(powers: Powers) -> tuple[Floats, Floats]:
     at the centre frequency. The weight of each frequency is W O / (W + O) of the powers relative to their
     maxima.
     """
-    water, other, detected = _clean(powers)
+    # Where both are well above the noise.
+    detected = (powers.water > MIN_SNR * powers.water_noise) & (powers.object > MIN_SNR * powers.object_noise)
+    water, other = powers.water - powers.water_noise, powers.object - powers.object_noise
     level = np.where(detected, 0.5 * np.log(water / other), 0.0)
     both = water.max(axis=1, keepdims=True) / water + other.max(axis=1, keepdims=True) / other
     weight = np.where(detected, 1.0 / both, 0.0)
@@ -138,12 +139,6 @@ def spectral_ratio(powers: Powers) -> tuple[Floats, Floats]:
     moved = share * np.sqrt(unsure)
     sigma = np.sqrt(np.einsum("ri,ij,rj->r", moved, powers.noise_correlation, moved))
     return (share * level).sum(axis=1), np.where(detected.sum(axis=1) > 2, sigma, np.nan)
-
-
-def _clean(powers: Powers) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """Powers of water and object minus the noise, and where both are well above the noise."""
-    detected = (powers.water > MIN_SNR * powers.water_noise) & (powers.object > MIN_SNR * powers.object_noise)
-    return powers.water - powers.water_noise, powers.object - powers.object_noise, detected
 
 
 def _gain(scale: Floats | None, emission: int) -> Floats | float:

@@ -183,7 +183,7 @@ def step(
     steps, changes = state.steps, state.changes
     if len(history) > 1:
         steps, changes = append_pair(
-            steps, changes, state.image - state.accepted_image, gradient - state.gradient, settings.memory
+            steps, changes, state.image - state.accepted_image, gradient - state.gradient
         )
     consecutive_increases = state.consecutive_increases + 1 if held > LEEWAY * state.best_held else 0
     better = not problem.held.size or held < state.best_held

@@ -52,5 +52,5 @@ def resampled_pairs(
             )
             for image in (step, change)
         )
-        steps, changes = append_pair(steps, changes, moved, factor * bent, len(curvature.steps))
+        steps, changes = append_pair(steps, changes, moved, factor * bent)
     return steps, changes

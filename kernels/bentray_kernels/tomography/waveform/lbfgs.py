@@ -8,6 +8,9 @@ import numpy as np
 
 from ...arrays import Floats
 
+# Most pairs of changes.
+MEMORY = 8
+
 # Pairs of changes of image and gradient with less relative curvature than this are left out.
 FLAT = 1e-10
 
@@ -38,20 +41,17 @@ def search_direction(
     return np.asarray(direction)
 
 
-def append_pair(
-    steps: Floats, changes: Floats, step: Floats, change: Floats, memory: int
-) -> tuple[Floats, Floats]:
-    """Append a pair and drop the oldest beyond ``memory`` pairs; unchanged if the curvature is not positive.
+def append_pair(steps: Floats, changes: Floats, step: Floats, change: Floats) -> tuple[Floats, Floats]:
+    """Append a pair and drop the oldest beyond ``MEMORY`` pairs; unchanged if the curvature is not positive.
 
     Args:
         steps, changes: (pairs, nx, ny).
         step, change: (nx, ny).
-        memory: most pairs.
     """
     along = float((step * change).sum())
     if not along > FLAT * float(np.sqrt((step**2).sum() * (change**2).sum())):
         return steps, changes
     return (
-        np.concatenate((steps, step[None]))[-memory:],
-        np.concatenate((changes, change[None]))[-memory:],
+        np.concatenate((steps, step[None]))[-MEMORY:],
+        np.concatenate((changes, change[None]))[-MEMORY:],
     )

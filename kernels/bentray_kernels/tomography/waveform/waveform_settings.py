@@ -6,7 +6,7 @@ from dataclasses import MISSING, dataclass
 from typing import Literal, NamedTuple
 
 from ...errors import InvalidInput
-from ...requests.limits import SPACING_M, SPEED_MPS, check_speeds
+from ...requests.limits import SPACING_M, check_speeds
 from ...requests.ranges import SEED, Range, check_ranges, ranged
 from ...wave.emissions import Engine
 from ...wave.simulation import Unknown
@@ -17,7 +17,6 @@ CORNER_HZ = Range(1e2, 1e11, unit="Hz")
 # Wide enough for every record and every array.
 WINDOW_S = Range(0.0, 1.0, above=True, unit="s")
 DISTANCE_M = Range(0.0, 100.0, unit="m")
-STEP_MPS = Range(0.0, SPEED_MPS.most, above=True, unit="m/s")
 
 
 @dataclass(frozen=True)
@@ -110,9 +109,6 @@ class WaveSettings:
         window_s: (before, after) the arrival in water, the window in which traces are compared, s.
         nearest_m: pairs nearer than this are left out, m.
         speed_bounds_mps: (lowest, highest) speed of a node, m/s.
-        largest_step_mps: highest rms of a step, m/s.
-        first_step_mps: rms of the first step of a band, m/s, before the curvature is known.
-        memory: pairs of changes used for the curvature (L-BFGS).
         held_out: number of emitters used only for validation.
         seed: of the draw of emitters.
         roi: whether only the dataset's region of interest may change (``mask/roi``).
@@ -126,9 +122,6 @@ class WaveSettings:
     window_s: tuple[float, float] = (60e-6, 40e-6)
     nearest_m: float = ranged(0.03, DISTANCE_M)
     speed_bounds_mps: tuple[float, float] = (1350.0, 1650.0)
-    largest_step_mps: float = ranged(12.0, STEP_MPS)
-    first_step_mps: float = ranged(2.0, STEP_MPS)
-    memory: int = ranged(8, Range(1, 1000))
     held_out: int = ranged(4, Range(0, 65_536))
     seed: int = ranged(0, SEED)
     roi: bool = False
@@ -149,7 +142,7 @@ class WaveSettings:
         """Limits of an image of speed or attenuation."""
         if of == "attenuation":
             return LOSS_STEPS
-        return Steps(self.speed_bounds_mps, self.first_step_mps, self.largest_step_mps)
+        return Steps(self.speed_bounds_mps, 2.0, 12.0)
 
     def measure(self, of: Unknown) -> Misfit:
         """The misfit that is minimised for speed or attenuation."""

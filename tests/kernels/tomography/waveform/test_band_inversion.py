@@ -49,7 +49,7 @@ def first(problem):
 def test_the_first_step_has_the_set_size_and_reduces_the_misfit(problem):
     state = first(problem)
     way = state.image - WATER
-    assert np.sqrt((way[problem.region] ** 2).mean()) == pytest.approx(SETTINGS.first_step_mps)
+    assert np.sqrt((way[problem.region] ** 2).mean()) == pytest.approx(SETTINGS.steps("speed").first)
     assert (way * state.gradient).sum() < 0.0
     assert not way[~problem.region].any()
 

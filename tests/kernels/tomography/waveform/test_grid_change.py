@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from bentray_kernels.tomography.waveform.grid_change import resampled, resampled_pairs
 from bentray_kernels.tomography.waveform.inversion_state import Curvature, Image
-from bentray_kernels.tomography.waveform.lbfgs import append_pair, search_direction
+from bentray_kernels.tomography.waveform.lbfgs import MEMORY, append_pair, search_direction
 
 from ....effort import effort
 
@@ -104,7 +104,7 @@ def test_a_quadratic_is_solved(seed):
         assert way @ gradient < 0.0
         length = -(way @ gradient) / (way @ curvature @ way)
         steps, changes = append_pair(
-            steps, changes, (length * way).reshape(2, 3), (length * curvature @ way).reshape(2, 3), 6
+            steps, changes, (length * way).reshape(2, 3), (length * curvature @ way).reshape(2, 3)
         )
         position = position + length * way
     assert np.allclose(position, aim, atol=1e-6)
@@ -118,8 +118,8 @@ def test_without_pairs_the_prior_decides():
 
 def test_only_so_many_pairs_are_kept_and_none_of_negative_curvature():
     steps = changes = np.zeros((0, 2, 3))
-    for k in range(5):
-        steps, changes = append_pair(steps, changes, np.full((2, 3), k + 1.0), np.ones((2, 3)), 3)
-    assert steps[:, 0, 0].tolist() == [3.0, 4.0, 5.0]
-    kept, _ = append_pair(steps, changes, np.ones((2, 3)), -np.ones((2, 3)), 3)
+    for k in range(10):
+        steps, changes = append_pair(steps, changes, np.full((2, 3), k + 1.0), np.ones((2, 3)))
+    assert steps[:, 0, 0].tolist() == [3.0 + k for k in range(MEMORY)]
+    kept, _ = append_pair(steps, changes, np.ones((2, 3)), -np.ones((2, 3)))
     assert kept is steps

@@ -52,8 +52,6 @@ def test_bad_bands_are_rejected(words):
         ({"window_s": (0.0, 1.0)}, "window_s"),
         ({"nearest_m": -1.0}, "nearest_m"),
         ({"speed_bounds_mps": (1600.0, 1400.0)}, "speed_bounds_mps"),
-        ({"first_step_mps": 0.0}, "first_step_mps"),
-        ({"memory": 0}, "memory"),
     ],
 )
 def test_bad_settings_are_rejected(words, field):

@@ -9,6 +9,7 @@ from bentray_kernels.tomography.settings import Settings
 from bentray_kernels.tomography.solver_choice import wave_engine
 from bentray_kernels.tomography.waveform.automatic_settings import WaveScale
 from bentray_kernels.tomography.waveform.band_grid import Extent
+from bentray_kernels.tomography.waveform.lbfgs import MEMORY
 from bentray_kernels.tomography.waveform.source_calibration import SHOTS
 from bentray_kernels.tomography.waveform.validation import validation_settings
 from bentray_kernels.tomography.waveform.waveform_settings import Band, WaveSettings
@@ -149,13 +150,13 @@ def _band_bytes(traces: Traces, width_m: float, settings: Settings, band: Band) 
         + max(SAMPLER_BYTES * traces.samples * extent.steps, SHOTS * SHOT_BYTES * samples)
         + medium
         # With the L-BFGS pairs of the band before, on its grid and on this one.
-        + (12 + 4 * WaveSettings((band,)).memory) * image,
+        + (12 + 4 * MEMORY) * image,
         "evaluate_emitter": base + in_flight + LOOK_BYTES * samples + medium + 4 * image,
         # The results of all emitters, and the L-BFGS pairs before and after.
         # Threads of compiled code keep the memory of the stored fields, see ``adjoint``.
         "update_image": base
         + (in_flight if wave_engine(settings) == "compiled" else 0)
         + 2 * image * looks
-        + 4 * WaveSettings((band,)).memory * image
+        + 4 * MEMORY * image
         + STEP_BYTES * extent.nodes**2,
     }
