@@ -1,4 +1,4 @@
-"""The `bentray` command: one file per subcommand, with lazy imports."""
+"""The `bentray` command: a file for each subcommand or a few that belong together, with lazy imports."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from . import (
     convert,
     demo,
     devices,
-    download,
     export,
     geometry_field,
     keys,
@@ -24,11 +23,9 @@ from . import (
     quality,
     reconstruct,
     render,
-    reproduce,
     serve,
     simulate,
     submit,
-    verify,
     webhooks,
     worker,
 )
@@ -56,17 +53,17 @@ PANELS: dict[str, tuple[Callable[..., Any], ...]] = {
         reconstruct.reconstruct,
         quality.quality,
         compare.compare,
-        reproduce.reproduce,
+        reconstruct.reproduce,
         simulate.simulate,
         geometry_field.geometry_field,
     ),
     "Data": (convert.convert, convert.correct, export.export),
-    "Service": (serve.serve, worker.worker, submit.submit, download.download),
+    "Service": (serve.serve, worker.worker, submit.submit, export.download),
     "Administration": (
         audit.audit,
         backup.backup,
         backup.restore,
-        verify.verify,
+        backup.verify,
         devices.devices,
         bench.bench,
     ),

@@ -171,7 +171,7 @@ class Result:
         Raises:
             InvalidInput: naming the argument.
         """
-        from .plotting import new_axes
+        from .comparison import new_axes
 
         axes = new_axes()[0] if ax is None else ax
         self._draw(axes, quantity, (axis, index), (low, high))
@@ -331,7 +331,7 @@ class Result:
     def _repr_html_(self) -> str:
         from bentray_workers.images.captions import facts
 
-        from .plotting import figure_png
+        from .comparison import figure_png
 
         shown = list(self.values)[:1] + [name for name in ("attenuation",) if name in self.values]
 
@@ -387,7 +387,7 @@ class Result:
         from bentray_workers.images.report import COLORMAPS
         from bentray_workers.images.slice import requested_limits, usual_limits
 
-        from .plotting import draw_plane
+        from .comparison import draw_plane
 
         name = next(iter(self.values)) if quantity is None else quantity
         grid = self._grid(name)
