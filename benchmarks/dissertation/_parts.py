@@ -17,9 +17,11 @@ from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import without_nan
 from bentray_workers.files.atomic import write_bytes
 
+from ._outline import benchmarks_of, items
+
 Rows = Callable[[BenchmarkContext], Iterable[Row]]
 
-OWN_WORKERS = "own workers"
+OWN_WORKERS, RECORDED = "own workers", "recorded rows"
 
 
 @dataclass(frozen=True)
@@ -142,3 +144,20 @@ def settings_of(rows: Rows, context: BenchmarkContext) -> dict[str, Any]:
         "sources": digest(rows.__module__),
         "cluster": context.scheduler or OWN_WORKERS,
     }
+
+
+def recorded_parts(results: Path) -> dict[str, Part]:
+    """By benchmark; without time and load, which rows state in their details where they matter.
+
+    Args:
+        results: folder of ``NAME.json``, lists of rows with a date, and of the pictures.
+    """
+    pictures = {name for item in items() for name in item.pictures if (results / name).is_file()}
+    parts = {}
+    for name in benchmarks_of(tuple(items())):
+        file = results / f"{name}.json"
+        if file.is_file():
+            rows = json.loads(file.read_text())
+            measured = max(row["measured"] for row in rows)
+            parts[name] = Part(name, {}, measured, None, None, rows, sorted(pictures))
+    return parts

@@ -16,9 +16,8 @@ from bentray_kernels.meshes.mesh import Chart
 from bentray_kernels.meshes.surface import Surface, surface_of
 
 from ._field_rays import as_columns, build_outer_field
-from ._linear_lookup import find_linear
 from ._plane_lookup import PlaneTable, find_by_plane, plane_table
-from ._reference_lookup import linear_uv, nearest_uv
+from ._reference_lookup import find_linear, linear_uv, nearest_uv
 
 # Samples along an edge of the cube, as the dissertation has them, and pixels of the geometry image.
 SAMPLES, PIXELS = 24, 512

@@ -12,15 +12,17 @@ import numpy as np
 from bentray_kernels.acquisition import Dataset, pick
 from bentray_kernels.acquisition.noise import with_noise
 from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
+from bentray_kernels.arrays import Floats
 from bentray_kernels.phantoms import TABLE7_SIDE_M
 from bentray_kernels.tomography import Reconstruction
+from bentray_kernels.tomography.problem import Problem
+from bentray_kernels.tomography.sart import sart_step
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_workers.simulation.plane import ring_radius
 from bentray_workers.simulation.simulation_run import simulate
 
 from ..shared._image_error import ImageError
-from ._known_skin import knowing_skin
 from ._phantom_scan import PhantomScan
 from ._table7_slices import NODES, Skin, SliceWaves, varied
 
@@ -35,6 +37,7 @@ ELEMENTS = 128
 
 # Rays that know the skin: iterations, and nodes of grids; on the finer one the skin has five nodes, not two.
 KNOWN_ITERATIONS, KNOWN_NODES = 10, (128, 256)
+EVERY_EMITTER = 10**6
 
 # Of the pulse: at 7.5 MHz, which section 7.1 plans for, a plane has 12,000² nodes.
 FREQUENCY_HZ, EMISSIONS = 2e5, 32
@@ -214,3 +217,26 @@ class Both:
         yield Row("readings with bent rays at 0.036", len(bent), 1, ">=", "", count)
         yield Row("readings with both", len(straight & bent), 1, ">=", "", count)
         yield Row("straight over bent rays, largest", ratio, STRAIGHT / BENT, ">=", "", most)
+
+
+def skin_alone(coupling_mps: float, nodes: int, side_m: float) -> Floats:
+    """The slice at the centre with its skin, and the coupling medium in place of all other tissue, m/s."""
+    speed, bare = (varied(coupling_mps, skin).at(0.0).speed(nodes, side_m) for skin in ("skin", "no skin"))
+    # Below the skin both phantoms are the same.
+    return np.where(speed == bare, coupling_mps, speed)
+
+
+def knowing_skin(scan: PhantomScan, like: Reconstruction) -> Reconstruction:
+    """The image of SART that begins with the true skin, by the settings and on the grid of another image.
+
+    Args:
+        scan: of the slice at the centre.
+        like: by SART, one slice.
+    """
+    nodes, coupling = like.speed.shape[0], scan.dataset.water_speed_mps
+    problem = Problem.from_dataset(scan.dataset, like.settings)
+    start = skin_alone(coupling, nodes, like.spacing_m[0] * (nodes - 1))
+    state = sart_step.begin(1.0 / start)
+    while not state.done:
+        state = sart_step.advance(problem, like.settings, state, EVERY_EMITTER)
+    return replace(like, speed=1.0 / state.slowness, history=state.history)

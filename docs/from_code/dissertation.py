@@ -15,10 +15,9 @@ def dissertation() -> str:
     # The benchmarks are a namespace package of the checkout.
     if str(ROOT) not in sys.path:
         sys.path.insert(0, str(ROOT))
-    recorded, report, page = (
-        import_module(f"benchmarks.dissertation.{name}") for name in ("_recorded", "_report", "_page")
+    parts, report, page = (
+        import_module(f"benchmarks.dissertation.{name}") for name in ("_parts", "_report", "_page")
     )
-    parts = recorded.recorded_parts(RESULTS)
-    made = report.report_of(parts, quick=False, cluster=recorded.RECORDED, recorded=True)
+    made = report.report_of(parts.recorded_parts(RESULTS), quick=False, cluster=parts.RECORDED, recorded=True)
     html = page.fragment(made, lambda benchmark, name: RESULTS / name)
     return f"```{{raw}} html\n{html}\n```"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from benchmarks.dissertation._outline import CHAPTERS, items
-from benchmarks.dissertation._recorded import RECORDED, recorded_parts
+from benchmarks.dissertation._parts import RECORDED, recorded_parts
 from benchmarks.dissertation._report import report_of
 from benchmarks.dissertation._summary import BETTER, CASES, NOT_REACHED, REPRODUCED, VERDICTS, verdict
 

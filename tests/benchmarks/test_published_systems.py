@@ -1,4 +1,4 @@
-"""Readings of the data-driven update: stretched ranges, and the recorded rows on the page."""
+"""Published systems: exact times and arcs of rays, readings of the update of speeds, and the page."""
 
 import json
 import re
@@ -6,9 +6,29 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.published._published_rays import distance_from_arcs, exact_times, times_of
 from benchmarks.published._speed_updates import readings, stretched
 
 ROOT = Path(__file__).parents[2]
+TEXT = (ROOT / "docs/reference/published-systems.md").read_text()
+ROWS = {
+    row["target"]: row for row in json.loads((ROOT / "benchmarks/results/published_systems.json").read_text())
+}
+STATED = re.findall(r"^\| ([^|]+) \| ([\d.]+) \| ([\d.]+) \|$", TEXT, re.MULTILINE)
+
+
+def test_times_are_those_of_the_medium():
+    times = exact_times(61)
+    np.testing.assert_allclose(times, times_of("accurate", 61), atol=3e-4)
+    # |∇T| = 1/(1 + 4x), away from the source.
+    slopes = np.hypot(*np.gradient(times, 1.0 / 60))[10:-5, 20:-5]
+    speed = 1.0 + 4.0 * np.linspace(0.0, 1.0, 61)[10:-5, None]
+    np.testing.assert_allclose(slopes * speed, 1.0, atol=5e-3)
+
+
+def test_b_splines_follow_the_arcs_of_exact_times_better():
+    times = exact_times(65)
+    assert distance_from_arcs(times, "bspline") < 0.3 * distance_from_arcs(times, "differences") < 0.005
 
 
 def test_values_of_a_region_are_stretched_to_a_range():
@@ -31,11 +51,15 @@ def test_readings_differ_in_where_and_when_they_stretch():
 
 
 def test_the_page_states_the_recorded_errors():
-    page = (ROOT / "docs/reference/published-systems.md").read_text()
-    rows = json.loads((ROOT / "benchmarks/results/published_systems.json").read_text())
-    details = {row["target"]: row["detail"] for row in rows}
-    lines = re.findall(r"^\| (.*coupling) \| (table6\S*) \| (.+) \|$", page, re.MULTILINE)
+    lines = re.findall(r"^\| (.*coupling) \| (table6\S*) \| (.+) \|$", TEXT, re.MULTILINE)
     assert len(lines) == 6
     for start, phantom, cells in lines:
-        detail = details[f"{phantom}, data-driven / fixed update, initial speed {start}"]
+        detail = ROWS[f"{phantom}, data-driven / fixed update, initial speed {start}"]["detail"]
         assert cells.split(" | ") == re.findall(r"([\d.]+) ± ", detail)
+
+
+def test_figures_are_the_recorded_ones():
+    assert len(STATED) > 10
+    for target, published, ours in STATED:
+        row = ROWS[target]
+        assert (f"{row['value']:.3g}", f"{row['goal']:.3g}") == (published, ours), target
