@@ -42,6 +42,11 @@ class RingScan:
         water_mps: speed of the water, m/s.
         peer: k-Wave, or None: our simulator.
         peer_step: its time step, in the longest of ours.
+        nodes_a_wave: nodes of our grid in the shortest wave.
+        before: time before the centre of the pulse, periods.
+        record_s: of the recording, s; None: until the slowest way across and the end of the pulse.
+        turn: of the first element, in the distance of two.
+        on_nodes: whether elements lie on nodes of our grid too, and do not hear themselves.
     """
 
     side_m: float
@@ -53,11 +58,16 @@ class RingScan:
     water_mps: float
     peer: Peer | None = None
     peer_step: float = 0.5
+    nodes_a_wave: float = OWN_NODES_A_WAVE
+    before: float = BEFORE
+    record_s: float | None = None
+    turn: float = 0.0
+    on_nodes: bool = True
 
     @property
     def nodes(self) -> int:
         """Along a side of the simulation."""
-        a_wave = PEER_NODES_A_WAVE if self.peer else OWN_NODES_A_WAVE
+        a_wave = PEER_NODES_A_WAVE if self.peer else self.nodes_a_wave
         return math.ceil(self.side_m * a_wave * HIGHEST * self.centre_hz / self.speeds_mps[0]) + 1
 
     @property
@@ -70,11 +80,12 @@ class RingScan:
         """Sampling rate of the traces, Hz."""
         return SAMPLES_A_PERIOD * self.centre_hz
 
-    def ring(self) -> Ints:
-        """The nodes on which the elements lie, (elements, 2)."""
-        turn = 2.0 * np.pi * np.arange(self.elements) / self.elements
+    def ring(self) -> Floats:
+        """Places of the elements in the grid, (elements, 2), nodes; of k-Wave always whole ones."""
+        turn = 2.0 * np.pi * (np.arange(self.elements) + self.turn) / self.elements
         position = self.radius_m * np.column_stack((np.cos(turn), np.sin(turn)))
-        return np.rint((position + 0.5 * self.side_m) / self.spacing_m).astype(int)
+        place = (position + 0.5 * self.side_m) / self.spacing_m
+        return np.rint(place) if self.on_nodes or self.peer else place
 
     def emitters(self) -> Ints:
         """Indices of the emitting elements."""
@@ -93,9 +104,9 @@ class RingScan:
         fraction = self.peer_step if self.peer else OWN_STEP
         skip = math.ceil(1.0 / (self.rate_hz * fraction * longest_step(self.speeds_mps[1], self.spacing_m)))
         step = 1.0 / (self.rate_hz * skip)
-        longest_s = 2.0 * self.radius_m / self.speeds_mps[0] + (BEFORE + AFTER) / self.centre_hz
-        samples = round(longest_s * self.rate_hz)
-        late = step * np.arange(samples * skip) * self.centre_hz - BEFORE
+        longest_s = 2.0 * self.radius_m / self.speeds_mps[0] + (self.before + AFTER) / self.centre_hz
+        samples = round((self.record_s or longest_s) * self.rate_hz)
+        late = step * np.arange(samples * skip) * self.centre_hz - self.before
         pulse = np.exp(-((0.9 * late) ** 2)) * np.sin(2.0 * np.pi * late)
         recorded = {}
         for name, speed in speeds.items():
@@ -111,9 +122,11 @@ class RingScan:
     def _shooter(self, speed: Floats, step: float, pulse: Floats) -> Callable[[int], np.ndarray]:
         """Simulates the emission of an element, (elements, steps)."""
         if self.peer is not None:
-            return partial(_shot_of_peer, self.peer, speed, self.spacing_m, step, self.ring(), pulse)
+            return partial(
+                _shot_of_peer, self.peer, speed, self.spacing_m, step, self.ring().astype(int), pulse
+            )
         medium = Medium.from_speed(speed, self.spacing_m, step, edge_nodes=EDGE_NODES, order=OWN_ORDER)
-        return partial(_own_shot, medium, self.ring() * self.spacing_m, pulse)
+        return partial(_own_shot, medium, self.ring() * self.spacing_m, pulse, self.on_nodes)
 
     def dataset(self, traces: np.ndarray, water: np.ndarray, speed: Floats, roi: Flags | None) -> Dataset:
         """A scan with its water shot and its truth.
@@ -124,7 +137,9 @@ class RingScan:
             roi: region of the errors, at the nodes.
         """
         corner = -0.5 * self.side_m
-        maker = "k-Wave" if self.peer else f"order {OWN_ORDER} in space, {OWN_NODES_A_WAVE:g} nodes in a wave"
+        maker = (
+            "k-Wave" if self.peer else f"order {OWN_ORDER} in space, {self.nodes_a_wave:g} nodes in a wave"
+        )
         return Dataset(
             element_position_m=self.ring() * self.spacing_m + corner,
             tx=self.emitters(),
@@ -136,7 +151,7 @@ class RingScan:
             radius_m=self.radius_m,
             center_frequency_hz=self.centre_hz,
             sampling_rate_hz=self.rate_hz,
-            t0_s=-BEFORE / self.centre_hz,
+            t0_s=-self.before / self.centre_hz,
             source=f"made by {maker}",
         )
 
@@ -150,7 +165,8 @@ def _shot_of_peer(
     return traces
 
 
-def _own_shot(medium: Medium, ring: Floats, pulse: Floats, element: int) -> np.ndarray:
+def _own_shot(medium: Medium, ring: Floats, pulse: Floats, deaf: bool, element: int) -> np.ndarray:
     traces = simulate(medium, ring[element], ring, pulse)
-    traces[element] = 0.0
+    if deaf:
+        traces[element] = 0.0
     return traces
