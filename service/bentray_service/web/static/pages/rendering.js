@@ -111,9 +111,8 @@ function Fields({ volume, histogram, marks, fields, onSlide }) {
   const { minimum, maximum, unit } = histogram ?? { minimum: 0, maximum: 1, unit: "" };
   const slide = (event) => {
     event.stopPropagation();
-    onSlide(rounded(minimum + ((maximum - minimum) * Number(event.target.value)) / STEPS));
+    onSlide(rounded(event.target.valueAsNumber));
   };
-  const step = histogram && marks.length ? (STEPS * (marks[0] - minimum)) / (maximum - minimum || 1) : undefined;
   const field = (name, more) => html`<${PlainField} name=${name} given=${fields[name]} ...${more} />`;
   return html`
     <fieldset class="modes">
@@ -123,7 +122,7 @@ function Fields({ volume, histogram, marks, fields, onSlide }) {
     </fieldset>
     <label for="iso" class="caption">Iso-value</label>
     <div id="histogram">${histogram && html`<${Histogram} ...${histogram} marks=${marks} format=${rounded} />`}</div>
-    <input id="iso-slider" type="range" min="0" max=${STEPS} value=${step} aria-label="Iso-value by slider" disabled=${!histogram}
+    <input id="iso-slider" type="range" min=${minimum} max=${maximum} step=${(maximum - minimum) / STEPS} value=${marks[0]} aria-label="Iso-value by slider" disabled=${!histogram}
       aria-valuetext=${marks.length ? `${rounded(marks[0])} ${unit}`.trim() : undefined} onInput=${slide} />
     <input id="iso" name="iso" type="number" step="any" placeholder=${automatic(histogram?.iso == null ? null : rounded(histogram.iso))} />
     <div class="numbers">

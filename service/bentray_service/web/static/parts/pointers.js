@@ -1,4 +1,4 @@
-// Mouse, pen and fingers on an element: presses, drags by one pointer, pinches by two.
+// Mouse, pen and fingers on an element: presses, drags by one pointer, pinches by two; and keys.
 import { useRef } from "./view.js";
 
 // Handlers for an element. Points are [x, y] in pixels from its corner. press(point) for a first pointer, then drag(point, before) for each of
@@ -37,3 +37,11 @@ export function usePointers({ press, drag, pinch, hover = () => {}, release = ()
     onPointerLeave: () => hover(null),
   };
 }
+
+// A handler of keys without Ctrl, Alt and Meta. actionsOf(event): functions by the names of keys.
+export const keyHandler = (actionsOf) => (event) => {
+  const action = event.ctrlKey || event.altKey || event.metaKey ? null : actionsOf(event)[event.key];
+  if (!action) return;
+  event.preventDefault();
+  action();
+};

@@ -1,5 +1,6 @@
 // The shot of a scan: which emission, its traces with arrivals over them, and the arrivals of one receiver as text.
 import { request } from "../parts/api.js";
+import { keyHandler } from "../parts/pointers.js";
 import { Alert, Choice, Facts, Field, html, Section, useEffect, useLayoutEffect, useRead, useRef, useSize, useState } from "../parts/view.js";
 import { float32Of } from "../viewer/npy.js";
 import { Axes, ticks } from "../viewer/plot.js";
@@ -114,13 +115,12 @@ export function Shot({ scan, hasWater, onEmission }) {
 
   const choose = (value) => setEmission(within(value, scan.ntx - 1));
   const point = (value) => shot && setCursor(within(value, shot.receivers - 1));
-  function onKeyDown(event) {
-    const move = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], PageUp: [0, -1], PageDown: [0, 1] }[event.key];
-    if (!move) return;
-    event.preventDefault();
-    if (move[0]) point(receiver + move[0]);
-    else choose(emission + move[1]);
-  }
+  const onKeyDown = keyHandler(() => ({
+    ArrowLeft: () => point(receiver - 1),
+    ArrowRight: () => point(receiver + 1),
+    PageUp: () => choose(emission - 1),
+    PageDown: () => choose(emission + 1),
+  }));
   const label = shot && `Traces of emission ${shot.emission}: ${shot.receivers} receivers over time`;
   return html`<${Section} id="shot" title="Traces" className="panel traces">
     <div class="shot-controls">

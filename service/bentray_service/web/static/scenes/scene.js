@@ -4,7 +4,7 @@ import { go } from "../parts/address.js";
 import { request, send } from "../parts/api.js";
 import { DropZone } from "../parts/drop_zone.js";
 import { titleOf } from "../parts/lists.js";
-import { usePointers } from "../parts/pointers.js";
+import { keyHandler, usePointers } from "../parts/pointers.js";
 import { Alert, Button, Choice, Facts, Form, html, Section, useAct, useEffect, useLater, useNewest, useRef, useState } from "../parts/view.js";
 import { inTime } from "../parts/words.js";
 import { PictureStream, rateOf } from "./picture_stream.js";
@@ -71,8 +71,9 @@ export function useScene({ records: first, id, query, pictureOf }) {
   return { records, setRecords, record, choose, error, act, setError, form, stream, refresh, values, show, camera: cameraOf(form, show) };
 }
 
-// Turns and zooms a view by mouse, touch and keyboard: handlers for a focusable element. turn(right, up) is called with degrees, zoom(factor) with a factor, and reset() for Home. grab(point) is
-// called for a press first: it returns what follows the moves of the pointer, at points of the element, where it takes the pointer for itself.
+// Turns and zooms a view by mouse, touch and keyboard: handlers for a focusable element. turn(right, up) is called with degrees, zoom(factor) with
+// a factor, and reset() for Home. grab(point) is called for a press first: it returns what follows the moves of the pointer, at points of the
+// element, where it takes the pointer for itself.
 function useOrbit({ turn, zoom, reset, grab }) {
   const follow = useRef(null);
   const pointers = usePointers({
@@ -85,10 +86,9 @@ function useOrbit({ turn, zoom, reset, grab }) {
     },
     pinch: zoom,
   });
-  function onKeyDown(event) {
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
-    const step = (event.shiftKey ? 3 : 1) * KEY_DEGREES;
-    const actions = {
+  const onKeyDown = keyHandler(({ shiftKey }) => {
+    const step = (shiftKey ? 3 : 1) * KEY_DEGREES;
+    return {
       ArrowLeft: () => turn(-step, 0),
       ArrowRight: () => turn(step, 0),
       ArrowUp: () => turn(0, step),
@@ -98,10 +98,7 @@ function useOrbit({ turn, zoom, reset, grab }) {
       "-": () => zoom(1 / KEY_ZOOM),
       Home: reset,
     };
-    if (!actions[event.key]) return;
-    event.preventDefault();
-    actions[event.key]();
-  }
+  });
   function onWheel(event) {
     // Elsewhere the wheel scrolls the page.
     if (document.activeElement !== event.currentTarget && !event.ctrlKey) return;

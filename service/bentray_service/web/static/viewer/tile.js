@@ -1,5 +1,5 @@
 // One image of the viewer: a canvas with its title; mouse, pen, touch and keys on it change the state of the view.
-import { usePointers } from "../parts/pointers.js";
+import { keyHandler, usePointers } from "../parts/pointers.js";
 import { html, useRef } from "../parts/view.js";
 import { AXES } from "./field.js";
 import { useImage } from "./image.js";
@@ -67,8 +67,8 @@ function actionsOf({ key, axis }, image, { main, state, window, change, setWindo
       else if (state.tool === "window") this.shift(-dy * DRAG_SHARE, Math.exp(dx * DRAG_SHARE * 2), drag.window);
       else change(withDrag(state, axis, inSpace(drag.at), inSpace(image.toPlane(px, py)), SAME_PX / image.scale, ended));
     },
-    // What a key does, nothing for others.
-    keyAction(event) {
+    // What keys do.
+    keys(event) {
       const { clientWidth: width, clientHeight: height } = event.currentTarget;
       const zoom = (factor) => this.zoomAt(width / 2, height / 2, factor);
       return {
@@ -89,7 +89,7 @@ function actionsOf({ key, axis }, image, { main, state, window, change, setWindo
         PageDown: () => this.moveSlice(-1),
         Enter: draws(state) && (() => this.mark([cursor[first], cursor[second]])),
         Escape: state.draft && (() => change({ draft: null })),
-      }[event.key];
+      };
     },
   };
 }
@@ -119,12 +119,6 @@ export function Tile({ tile, words, look, actions }) {
       pressed.current = null;
     },
   });
-  const onKeyDown = (event) => {
-    const action = event.ctrlKey || event.altKey || event.metaKey ? null : act().keyAction(event);
-    if (!action) return;
-    action();
-    event.preventDefault();
-  };
   const onWheel = (event) => {
     event.preventDefault();
     act().zoomAt(event.offsetX, event.offsetY, WHEEL ** -event.deltaY);
@@ -133,7 +127,7 @@ export function Tile({ tile, words, look, actions }) {
   const label = `Image of ${words}${tile.title && `, ${tile.title}`}; arrow keys move the cursor`;
   return html`<figure class="tile">
     <canvas ref=${canvas} class=${grip ? "plane grip" : "plane"} tabindex="0" role="application" aria-roledescription="image" aria-label=${label}
-      ...${image && { onKeyDown, onWheel, ...pointers }}></canvas>
+      ...${image && { onKeyDown: keyHandler((event) => act().keys(event)), onWheel, ...pointers }}></canvas>
     ${marks}
     ${tile.title && html`<figcaption>${tile.title}</figcaption>`}
   </figure>`;
