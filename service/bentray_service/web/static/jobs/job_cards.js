@@ -1,11 +1,10 @@
 // A list of the newest jobs as cards, kept up to date while the page is open: pictures, state, progress, plan, misfit and files.
-import { linkTo } from "../parts/address.js";
+import { glassOf, linkTo, queryOf, shownBy } from "../parts/address.js";
 import { inWords, request } from "../parts/api.js";
 import { FORMATS } from "../parts/export_menu.js";
 import { KeyLink, Picture } from "../parts/key.js";
 import { loadTitles, titleOfJob } from "../parts/lists.js";
 import { Alert, Button, html, useRead, useState } from "../parts/view.js";
-import { glassOf, queryOf, shownBy } from "../parts/views.js";
 import { duration, inNanoseconds, placeInQueue, settingsOf, tasksInWords } from "../parts/words.js";
 import { useJobs } from "./followed_jobs.js";
 import { residuals, Sparkline } from "./misfit_curve.js";

@@ -1,11 +1,10 @@
 // Volume rendering: a volume as a lit surface or as glass, turned by mouse, touch or keyboard, and turntables of it.
-import { keepQuery } from "../parts/address.js";
+import { glassOf, keepQuery, queryOf, shownBy } from "../parts/address.js";
 import { propertiesOf, request } from "../parts/api.js";
 import { KeyLink } from "../parts/key.js";
 import { load, titleOf } from "../parts/lists.js";
 import { PlainField } from "../parts/settings_fields.js";
 import { html, useEffect, useRead, useReducer, useRef, useState } from "../parts/view.js";
-import { glassOf, queryOf, shownBy } from "../parts/views.js";
 import { planOf, waitInWords } from "../parts/words.js";
 import { CAMERA, FULL_PX, PREVIEW_PX, rounded, ScenePage, useScene } from "../scenes/scene.js";
 import { localPreviews } from "../webgl/local_previews.js";

@@ -1,13 +1,12 @@
 // The result of a reconstruction: image to measure in, how it was made, and what can be done with it.
 import { Thumbnail } from "../jobs/job_cards.js";
 import { Onward, onwardIn } from "../jobs/onward.js";
-import { go, keepQuery, parse } from "../parts/address.js";
+import { go, keepQuery, parse, queryOf } from "../parts/address.js";
 import { kept, request, send } from "../parts/api.js";
 import { ExportMenu } from "../parts/export_menu.js";
 import { Provenance } from "../parts/provenance.js";
 import { ChoiceTable, facts, loadResult, nameOf, PlanTable, TruthTable } from "../parts/result_tables.js";
 import { Alert, Button, CopyButton, Facts, Form, html, Menu, useAct, useEffect, useRead, useRef, useState } from "../parts/view.js";
-import { queryOf } from "../parts/views.js";
 import { inTime } from "../parts/words.js";
 import { QUANTITIES } from "../viewer/quantities.js";
 import { stateOf } from "../viewer/state.js";

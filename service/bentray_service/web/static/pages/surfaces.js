@@ -1,10 +1,9 @@
 // Surface rendering: a mesh with its geometry field as mirror, glass or clay, turned by mouse, touch or keyboard, its objects moved.
-import { keepQuery } from "../parts/address.js";
+import { keepQuery, queryOf } from "../parts/address.js";
 import { parametersOf, propertiesOf, request } from "../parts/api.js";
 import { load, titleOf } from "../parts/lists.js";
 import { PlainField } from "../parts/settings_fields.js";
 import { Field, html, Pairs, useEffect, useRead, useState } from "../parts/view.js";
-import { queryOf } from "../parts/views.js";
 import { counted } from "../parts/words.js";
 import { objectAt, objectsOf, placeAt } from "../scenes/camera.js";
 import { CAMERA, clamped, FULL_PX, PREVIEW_PX, ScenePage, useScene } from "../scenes/scene.js";

@@ -1,8 +1,8 @@
 // The menu of downloads of a result: every format, and the picture of the view.
 import { QUANTITIES } from "../viewer/quantities.js";
+import { queryOf } from "./address.js";
 import { KeyLink } from "./key.js";
 import { Facts, html, Menu, Options, useState } from "./view.js";
-import { queryOf } from "./views.js";
 
 export const FORMATS = await (await fetch("/static/export_formats.json")).json();
 const WHOLE = FORMATS.filter(({ single }) => !single);

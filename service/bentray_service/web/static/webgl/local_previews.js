@@ -1,6 +1,6 @@
 // Previews that the graphics card of this browser draws while a view moves; the service draws where it cannot or is slow.
+import { queryOf } from "../parts/address.js";
 import { respond } from "../parts/api.js";
-import { queryOf } from "../parts/views.js";
 import { parseNpy } from "../viewer/npy.js";
 import { hasFilter, hasGraphicsCard, MAX_ISOS, rayCaster } from "./ray_caster.js";
 
