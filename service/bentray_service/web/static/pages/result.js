@@ -4,6 +4,7 @@ import { Onward, onwardIn } from "../jobs/onward.js";
 import { go, keepQuery, parse, queryOf } from "../parts/address.js";
 import { kept, request, send } from "../parts/api.js";
 import { ExportMenu } from "../parts/export_menu.js";
+import { deleteRecord } from "../parts/lists.js";
 import { Provenance } from "../parts/provenance.js";
 import { ChoiceTable, facts, loadResult, nameOf, PlanTable, TruthTable } from "../parts/result_tables.js";
 import { Alert, Button, CopyButton, Facts, Form, html, Menu, useAct, useEffect, useRead, useRef, useState } from "../parts/view.js";
@@ -79,10 +80,7 @@ function Result({ result: first, query }) {
     setJob(await send("PATCH", job.links.self, { name: changed }));
     setRenaming(false);
   });
-  const remove = () => confirm(`Delete the result ${name} for good?`) && act(async () => {
-    await request(volume.links.self, { method: "DELETE" });
-    go("/jobs");
-  });
+  const remove = () => deleteRecord(act, `the result ${name}`, volume.links.self, "/jobs");
   // The view beside the job that goes on from this one.
   const keep = (view) => keepQuery(new URLSearchParams([...view, ...onwardIn(parse(location.hash).query)]));
   const stored = () => QUANTITIES[state.quantity].reads[0];

@@ -1,5 +1,5 @@
 // Lists of records: titles, pages of a list that is newest first, and fields that search while one types.
-import { linkTo } from "./address.js";
+import { go, linkTo } from "./address.js";
 import { request } from "./api.js";
 import { Form, html, useLater } from "./view.js";
 
@@ -25,6 +25,12 @@ export function titleOfJob(job) {
   const record = field && known[FIELDS[field]].get(job[field]);
   return record ? titleOf(record) : field ? job[field] : job.id;
 }
+
+// Deletes a record for good after a question, and opens another page. act: of useAct.
+export const deleteRecord = (act, name, address, path) => confirm(`Delete ${name} for good?`) && act(async () => {
+  await request(address, { method: "DELETE" });
+  go(path);
+});
 
 // Load what the jobs refer to and is not known yet.
 export async function loadTitles(jobs) {

@@ -1,7 +1,7 @@
 // Name, notes and water of a scan: shown, and changed in a form; a corrected copy of a scan in wrong units. Its file stays as it is.
 import { go } from "../parts/address.js";
-import { request, send } from "../parts/api.js";
-import { titleOf } from "../parts/lists.js";
+import { send } from "../parts/api.js";
+import { deleteRecord, titleOf } from "../parts/lists.js";
 import { Alert, Button, Choice, Facts, Field, Form, html, Labelled, useAct, useEffect, useRef, useShown, useState } from "../parts/view.js";
 
 const TIMES = { s: "s", ms: "ms", us: "µs", ns: "ns" };
@@ -121,10 +121,7 @@ export function ScanEditor({ scan, proposed, onChange, openWater }) {
     const made = await send("POST", `${address}/corrections`, correction, { "Idempotency-Key": key });
     if (shown.current) go(`/scans/${made.id}`);
   });
-  const remove = () => confirm(`Delete ${titleOf(scan)} and its reconstructions for good?`) && attemptDelete(async () => {
-    await request(address, { method: "DELETE" });
-    go("/");
-  });
+  const remove = () => deleteRecord(attemptDelete, `${titleOf(scan)} and its reconstructions`, address, "/");
   const correcting = field === "times_in";
   const opener = (id, name, expanded, words) => html`<button id=${id} type="button" class="quiet" ref=${expanded ? button : null} aria-expanded=${expanded}
     aria-controls=${`${id}-form`} onClick=${() => (expanded ? close() : open(name))}>${words}</button>`;

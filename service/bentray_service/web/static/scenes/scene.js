@@ -1,9 +1,9 @@
 // What the pages of volume and surface rendering share: the picture of a view, its camera, the form of the view, and what is rendered.
 import { JobList } from "../jobs/job_cards.js";
 import { go } from "../parts/address.js";
-import { request, send } from "../parts/api.js";
+import { send } from "../parts/api.js";
 import { DropZone } from "../parts/drop_zone.js";
-import { titleOf } from "../parts/lists.js";
+import { deleteRecord, titleOf } from "../parts/lists.js";
 import { keyHandler, usePointers } from "../parts/pointers.js";
 import { Alert, Button, Choice, Facts, Form, html, Section, useAct, useEffect, useLater, useNewest, useRef, useState } from "../parts/view.js";
 import { inTime } from "../parts/words.js";
@@ -147,10 +147,7 @@ export function ScenePage(props) {
     await send("POST", "/v1/jobs", begin.job());
     await scene.refresh.current();
   });
-  const remove = () => confirm(`Delete ${titleOf(record)} and its ${products} for good?`) && act(async () => {
-    await request(record.links.self, { method: "DELETE" });
-    go(path);
-  });
+  const remove = () => deleteRecord(act, `${titleOf(record)} and its ${products}`, record.links.self, path);
   return html`
     <h1>${title}</h1>
     <section aria-label=${title} class="panel viewer">
