@@ -78,9 +78,7 @@ def render(
         shown = "neither a file nor --phantom" if file is None else "a file and --phantom"
         raise InvalidInput("file", shown, "one of the two")
     if phantom is not None:
-        for option, value in {"--shape": shape, "--dtype": dtype, "--spacing": spacing}.items():
-            if value:
-                raise InvalidInput(option, value, "no such option with --phantom")
+        _refuse({"--shape": shape, "--dtype": dtype, "--spacing": spacing})
     view, picture = view_of(options)
     check_available(view.device)
     outputs = {"--output": output, "--map": position_map}
@@ -119,6 +117,12 @@ def render(
     if placed is not None:
         write_array(placed, position)
     _show(volume, view, png, placed, device, (built - started, seconds), as_json=as_json)
+
+
+def _refuse(given: dict[str, object]) -> None:
+    for option, value in given.items():
+        if value:
+            raise InvalidInput(option, value, "no such option with --phantom")
 
 
 def _sampled(phantom: SampledPhantom, nodes: int) -> Volume:
