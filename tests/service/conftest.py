@@ -34,6 +34,8 @@ from bentray_workers.cluster.connection import Cluster, open_cluster
 from bentray_workers.cluster.fair_shares import Share
 from bentray_workers.reconstruction import reconstruction_run
 
+from ..waiting import wait_until
+
 with warnings.catch_warnings():
     # Starlette's test client would rather have httpx2; our own client is written for httpx.
     warnings.simplefilter("ignore", UserWarning)
@@ -416,18 +418,15 @@ def on_workers(tmp_path: Path, workers: Cluster) -> Callable[..., AbstractContex
 
 
 @contextmanager
-def serving(settings: ServiceSettings, cluster: FakeCluster) -> Iterator[str]:
-    """A service behind a real socket; gives its address."""
+def serving(settings: ServiceSettings, cluster: FakeCluster, port: int = 0) -> Iterator[str]:
+    """A service behind a real socket; gives its address, and stops it as by SIGTERM."""
     app = create_app(settings, cluster)
-    server, listening = uvicorn.Server(configuration(app)), listen("127.0.0.1", 0)
+    server, listening = uvicorn.Server(configuration(app)), listen("127.0.0.1", port)
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]}, daemon=True)
     thread.start()
     try:
-        deadline = time.monotonic() + PATIENCE_S
-        while not server.started:
-            assert thread.is_alive()
-            assert time.monotonic() < deadline
-            time.sleep(0.02)
+        wait_until(lambda: server.started or not thread.is_alive(), PATIENCE_S)
+        assert thread.is_alive()
         yield f"http://127.0.0.1:{listening.getsockname()[1]}"
     finally:
         # As ``bentray serve`` does: streams of events end first.

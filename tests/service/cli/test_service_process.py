@@ -5,7 +5,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -16,6 +15,8 @@ import pytest
 from bentray_service.cli import service_process
 from bentray_service.cli.output.exit_codes import WorkFailed
 from bentray_service.cli.service_process import running_service
+
+from ...waiting import wait_until
 
 # Says that it is there, then works until it is told to stop; the last word ignores being told.
 STAND_IN = """
@@ -55,14 +56,6 @@ def ended(pid: int) -> bool:
         return True
 
 
-def gone(pid: int) -> bool:
-    """Whether a process that was killed has ended; the kernel takes a moment."""
-    deadline = time.monotonic() + 60.0
-    while not ended(pid) and time.monotonic() < deadline:
-        time.sleep(0.01)
-    return ended(pid)
-
-
 @pytest.mark.parametrize("words", [(), ("stubborn",)])
 def test_service_and_workers_stop_after_a_failure(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, words: tuple[str, ...]
@@ -77,7 +70,7 @@ def test_service_and_workers_stop_after_a_failure(
 
     with pytest.raises(ZeroDivisionError):
         child_in(running_service(tmp_path, tmp_path / "log"), fail)
-    assert gone(seen[0])
+    wait_until(lambda: ended(seen[0]))
 
 
 def test_service_stops_with_its_parent(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -91,7 +84,7 @@ def test_service_stops_with_its_parent(monkeypatch: pytest.MonkeyPatch, tmp_path
 
     with pytest.raises(KeyboardInterrupt):
         child_in(running_service(tmp_path, tmp_path / "log"), end)
-    assert gone(seen[0])
+    wait_until(lambda: ended(seen[0]))
     assert signal.getsignal(signal.SIGTERM) == before
 
 

@@ -1,21 +1,16 @@
 """Retries of the client: only idempotent requests, bounded, while the service is away."""
 
 import asyncio
-import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 import tenacity
-import uvicorn
 from tenacity import Retrying
 
-from bentray_service.app import create_app
 from bentray_service.client import AsyncClient, Client, ClientError, connection, flows, uploading
 from bentray_service.client.connection import Connection, Retries
 from bentray_service.client.errors import NoAnswer
@@ -23,6 +18,8 @@ from bentray_service.client.steps import DownloadStep, RequestStep
 from bentray_service.settings import ServiceSettings
 
 from ...free_ports import free_port
+from ...waiting import wait_until
+from ..conftest import serving
 from .cutting_proxy import cutting
 
 LOOK = RequestStep("GET", "/v1/jobs/job-1", repeatable=True)
@@ -199,40 +196,21 @@ def test_so_it_is_asynchronously(serve: Callable[..., str], scan: Callable[..., 
     assert cuts == []
 
 
-@contextmanager
-def service(data: Path, port: int, cluster: Any) -> Iterator[int]:
-    """The application behind a real socket; on leaving it is stopped as by SIGTERM."""
-    app = create_app(ServiceSettings(data_dir=data), cluster)
-    server = uvicorn.Server(uvicorn.Config(app, port=port, log_level="warning", lifespan="on"))
-    thread = threading.Thread(target=server.run, daemon=True)
-    thread.start()
-    while not server.started:
-        assert thread.is_alive()
-        time.sleep(0.02)
-    try:
-        yield int(server.servers[0].sockets[0].getsockname()[1])
-    finally:
-        app.state.leaving.set()
-        server.should_exit = True
-        thread.join()
-
-
 def test_a_job_is_waited_for_while_its_service_is_started_again(
     scan: Callable[..., Path], work: Any, cluster: Any, tmp_path: Path, soon: None
 ) -> None:
     told: list[str] = []
     with ThreadPoolExecutor(1) as pool:
         work.hold.clear()
-        with service(tmp_path / "data", free_port(), cluster) as port:
-            client = Client(f"http://127.0.0.1:{port}", poll_s=0.05, on_wait=told.append)
+        settings, port = ServiceSettings(data_dir=tmp_path / "data"), free_port()
+        with serving(settings, cluster, port) as url:
+            client = Client(url, poll_s=0.05, on_wait=told.append)
             job = client.submit(client.upload(scan()).id, {"nodes": 16, "iterations": 1}).id
             done = pool.submit(client.wait, job)
-            while not work.calls:
-                time.sleep(0.02)
-        while not told:
-            time.sleep(0.02)
+            wait_until(lambda: work.calls)
+        wait_until(lambda: told)
         work.hold.set()
-        with service(tmp_path / "data", port, cluster), client:
+        with serving(settings, cluster, port), client:
             record = done.result(timeout=60.0)
             assert client.download(record.volume, "h5", tmp_path / "image.h5").stat().st_size > 0
     assert (record.id, record.state, len(work.calls)) == (job, "succeeded", 2)

@@ -13,7 +13,6 @@ import io
 import json
 import tarfile
 import tempfile
-import time
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -31,6 +30,7 @@ from bentray_service.rows.tables import VERSION
 from bentray_workers.files.dataset import write_dataset
 
 from ...faults.live_service import LiveService
+from ...waiting import wait_until
 
 TENANTS = ("clinic", "lab")
 LISTS = ("jobs", "datasets", "volumes", "meshes", "batches")
@@ -95,7 +95,7 @@ def _use(root: Path, service: LiveService, tenant: str) -> dict[str, Any]:
         _made(http.patch(f"/v1/datasets/{dataset}", json={"title": f"Scan of {tenant}", "notes": "cold"}))
         job = _made(http.post("/v1/jobs", json={**_request(dataset, DONE), "webhook": WEBHOOK}))
         _wait(http, job)
-        _wait_for_attempt(http, job)
+        wait_until(lambda: _job(http, job)["webhook"]["attempts"])
         _made(http.patch(f"/v1/jobs/{job}", json={"name": "the first"}))
         volume = io.BytesIO()
         np.savez(volume, speed=np.linspace(1400.0, 1600.0, 8**3).reshape(8, 8, 8))
@@ -109,7 +109,7 @@ def _use(root: Path, service: LiveService, tenant: str) -> dict[str, Any]:
         member = {"member": "user:alice", "role": "reader"}
         http.put(project.json()["links"]["members"], json=member).raise_for_status()
         projects = [http.get(project.json()["links"]["self"]).json()]
-        webhook = http.get(f"/v1/jobs/{job}").json()["webhook"]
+        webhook = _job(http, job)["webhook"]
         return {"dataset": dataset, "done": job, "projects": projects, "webhook": webhook, **_seen(http)}
 
 
@@ -118,10 +118,7 @@ def _begin_long_job(service: LiveService, expected: dict[str, Any]) -> None:
     with _client(service, "clinic") as http:
         job = _made(http.post("/v1/jobs", json=_request(expected["clinic"]["dataset"], LONG)))
         folder = service.data / "tenants/clinic/work" / job / "checkpoints"
-        deadline = time.monotonic() + 300.0
-        while len(list(folder.glob("*.npz"))) < 2:
-            assert time.monotonic() < deadline
-            time.sleep(0.005)
+        wait_until(lambda: len(list(folder.glob("*.npz"))) >= 2, 300.0, 0.005)
         expected["clinic"]["interrupted"] = job
     service.kill()
     assert len(list(folder.glob("*.npz"))) >= 1
@@ -159,18 +156,14 @@ def _made(answer: httpx.Response) -> str:
 
 
 def _wait(http: httpx.Client, job: str) -> None:
-    deadline = time.monotonic() + 600.0
-    while (state := http.get(f"/v1/jobs/{job}").json()["state"]) != "succeeded":
-        assert state in ("queued", "running")
-        assert time.monotonic() < deadline
-        time.sleep(0.1)
+    state = wait_until(
+        lambda: (found := _job(http, job)["state"]) not in ("queued", "running") and found, 600
+    )
+    assert state == "succeeded"
 
 
-def _wait_for_attempt(http: httpx.Client, job: str) -> None:
-    deadline = time.monotonic() + 60.0
-    while not http.get(f"/v1/jobs/{job}").json()["webhook"]["attempts"]:
-        assert time.monotonic() < deadline
-        time.sleep(0.1)
+def _job(http: httpx.Client, job: str) -> dict[str, Any]:
+    return dict(http.get(f"/v1/jobs/{job}").json())
 
 
 def _client(service: LiveService, tenant: str) -> httpx.Client:

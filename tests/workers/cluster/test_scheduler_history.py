@@ -1,7 +1,6 @@
 """Scheduler, streams and workers keep no state of finished tasks."""
 
 import gc
-import time
 from collections.abc import Iterator
 from typing import Any
 
@@ -12,10 +11,11 @@ from distributed.scheduler import TaskGroup
 
 from bentray_workers.cluster.connection import Cluster, open_cluster
 
+from ...waiting import wait_until
+
 TASKS = 20
 # Of an array that each task is given.
 VALUES = 10_000
-FORGET_S = 60.0
 
 
 @pytest.fixture
@@ -30,10 +30,7 @@ def run_tasks(cluster: Cluster) -> None:
     deployed: Any = cluster._deployed
     for number in range(TASKS):
         assert cluster.client.submit(np.sum, np.full(VALUES, number), pure=False).result() == VALUES * number
-        deadline = time.monotonic() + FORGET_S
-        while deployed.scheduler.tasks:
-            assert time.monotonic() < deadline
-            time.sleep(0.005)
+        wait_until(lambda: not deployed.scheduler.tasks, pause_s=0.005)
 
 
 def alive(kind: type[Any]) -> list[Any]:
@@ -47,10 +44,7 @@ def test_no_group_of_tasks_is_kept(cluster: Cluster) -> None:
     before = {id(left) for left in alive(TaskGroup)}
     run_tasks(cluster)
     # The event loop may still handle the last message. A list of the groups themselves would keep them.
-    deadline = time.monotonic() + FORGET_S
-    while kept := [repr(left) for left in alive(TaskGroup) if id(left) not in before]:
-        assert time.monotonic() < deadline, kept
-        time.sleep(0.01)
+    wait_until(lambda: all(id(left) in before for left in alive(TaskGroup)))
 
 
 def test_no_message_is_kept(cluster: Cluster) -> None:

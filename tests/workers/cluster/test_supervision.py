@@ -3,8 +3,7 @@
 import os
 import re
 import signal
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
@@ -20,14 +19,9 @@ from bentray_workers.cluster import providers, supervision
 from bentray_workers.cluster.connection import Cluster, open_cluster
 from bentray_workers.cluster.supervision import Losses
 
+from ...waiting import wait_until
+
 PATIENCE_S = 60.0
-
-
-def wait_until(so: Callable[[], object]) -> None:
-    deadline = time.monotonic() + PATIENCE_S
-    while not so():
-        assert time.monotonic() < deadline, "it did not happen in time"
-        time.sleep(0.05)
 
 
 def worker_pids() -> set[int]:

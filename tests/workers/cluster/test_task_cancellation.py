@@ -16,6 +16,8 @@ from bentray_workers.files.volume import Volume
 from bentray_workers.rendering import scene_cache
 from bentray_workers.rendering.refraction_view import RefractionView
 
+from ...waiting import wait_until
+
 BEGUN, ENDED = threading.Event(), []
 PATIENCE_S = 60.0
 
@@ -51,9 +53,7 @@ def test_a_task_that_is_released_ends(background):
         assert BEGUN.wait(PATIENCE_S)
         assert not ENDED
         future.release()
-        until = time.monotonic() + PATIENCE_S
-        while not ENDED and time.monotonic() < until:
-            time.sleep(0.01)
+        wait_until(lambda: ENDED)
     assert ENDED == ["early"]
 
 

@@ -1,12 +1,13 @@
 """Health of workers: memory, threads and load of each, without addresses."""
 
-import time
 from dataclasses import asdict
 
 import pytest
 
 from bentray_workers.cluster.scheduler_load import load_of
 from bentray_workers.cluster.worker_health import health_of
+
+from ...waiting import wait_until
 
 
 class Scheduler:
@@ -32,9 +33,7 @@ def test_embedded_workers_report_themselves(cluster):
 
 def test_the_scheduler_reports_its_load(cluster):
     future = cluster.client.submit(abs, -1, resources={"no such resource": 1})
-    deadline = time.monotonic() + 120.0
-    while (load := load_of(cluster.client)).waiting_tasks != 1:
-        assert time.monotonic() < deadline
+    load = wait_until(lambda: (load := load_of(cluster.client)).waiting_tasks == 1 and load, 120.0)
     assert load.tasks >= 1
     assert load.memory_bytes > 1e6
     future.cancel()

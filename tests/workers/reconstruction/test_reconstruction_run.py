@@ -20,6 +20,7 @@ from bentray_workers.files.dataset import write_dataset
 from bentray_workers.files.findings import ScanFindings
 from bentray_workers.reconstruction import picking_graph, reconstruction_run
 
+from ...waiting import wait_until
 from ..cluster.tearing import torn_runs
 
 PLAN = Settings(method="sart", nodes=32, iterations=2)
@@ -123,13 +124,9 @@ def test_missing_file_is_named(cluster, tmp_path):
 def test_cluster_is_empty_afterwards(cluster, path, plan):
     before = set(cluster.client.futures)
     reconstruction_run.reconstruct(cluster.client, path, plan)
-    # A client lets go of futures in a thread of its own.
-    deadline = time.monotonic() + 60.0
-    while not set(cluster.client.futures) <= before:
-        assert time.monotonic() < deadline
-        # Where Dask waited in vain for a while, the frames of its exception hold futures in a cycle.
-        gc.collect()
-        time.sleep(0.05)
+    # A client lets go of futures in a thread of its own; where Dask waited in vain for a while, the frames of
+    # its exception hold futures in a cycle.
+    wait_until(lambda: gc.collect() >= 0 and set(cluster.client.futures) <= before)
 
 
 @pytest.mark.parametrize("plan", [*METHODS, *OTHERS.values()], ids=[*(p.method for p in METHODS), *OTHERS])
