@@ -1,9 +1,11 @@
-"""Memory that a module of the tests measures in a process of its own, and what a plan states wrongly."""
+"""Memory that calls and modules of the tests take, and what a plan states wrongly."""
 
 import json
 import os
 import subprocess
 import sys
+import tracemalloc
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -30,3 +32,13 @@ def wrong(told: dict[str, int], taken: dict[str, int], factor: float, spare: int
     assert set(told) == set(taken)
     bounds = {name: (most, factor * most + spare) for name, most in taken.items()}
     return [f"{n}: {told[n]}" for n, (least, most) in bounds.items() if not least <= told[n] <= most]
+
+
+def peak_of(work: Callable[[], object]) -> int:
+    """Most bytes of Python and NumPy during a call."""
+    tracemalloc.start()
+    try:
+        work()
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()

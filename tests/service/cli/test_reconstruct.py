@@ -2,8 +2,6 @@
 
 import json
 import os
-import subprocess
-import sys
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -133,17 +131,3 @@ def test_a_volume_of_one_height_is_rejected_before_any_worker_starts() -> None:
 def test_rejects_bad_headers_before_start(settings: Settings, field: str) -> None:
     with pytest.raises(InvalidInput, match=field):
         check_scan(heights(1), settings, 0)
-
-
-def test_that_check_needs_no_compiled_code() -> None:
-    result = subprocess.run(
-        [
-            sys.executable,
-            "-c",
-            "import sys, bentray_kernels.tomography.requirements as _; print(*sys.modules)",
-        ],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert not {"numba", "scipy", "distributed"} & set(result.stdout.split())

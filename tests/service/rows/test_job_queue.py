@@ -1,7 +1,6 @@
 """The queue: jobs claimed in order and by turns, their states, leases and ends."""
 
 import math
-import threading
 import time
 from types import SimpleNamespace
 
@@ -15,30 +14,15 @@ from bentray_service.rows.jobs import NewJob
 from bentray_service.rows.projects import Projects
 from bentray_service.rows.stored_tables import Volumes
 
-from .conftest import volume_row
+from .conftest import at_once, volume_row
 
 PROBLEM = {"type": "/problems/x", "title": "t", "status": 500, "detail": "why"}
 
 
-def test_claimed_in_order(jobs, queue, dataset):
-    made = [jobs.add(LOCAL, NewJob("reconstruction", {}, dataset)).id for _ in range(3)]
-    assert [queue.claim().id for _ in range(3)] == made
-    assert queue.claim() is None
-
-
 def test_no_job_is_claimed_twice(jobs, queue, dataset):
     made = {jobs.add(LOCAL, NewJob("reconstruction", {}, dataset)).id for _ in range(12)}
-    claimed = []
-
-    def take():
-        while (job := queue.claim()) is not None:
-            claimed.append(job.id)
-
-    threads = [threading.Thread(target=take) for _ in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    taken = at_once(lambda _: list(iter(queue.claim, None)), 4)
+    claimed = [job.id for jobs_of_one in taken for job in jobs_of_one]
     assert len(claimed) == 12
     assert set(claimed) == made
 

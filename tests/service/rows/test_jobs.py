@@ -4,7 +4,7 @@ import random
 
 import pytest
 
-from bentray_service.errors import JobFinished, KeyReused, QueueFull, UnknownId
+from bentray_service.errors import KeyReused, QueueFull, UnknownId
 from bentray_service.rows.ids import LOCAL, Tenant, new_id
 from bentray_service.rows.jobs import NewJob, Submission
 from bentray_service.rows.stored_tables import Datasets
@@ -37,14 +37,6 @@ def test_another_tenants_job_is_as_none(jobs, dataset):
             told.append(str(refusal.value).replace(name or "''", ""))
         assert told[0] == told[1]
     assert jobs.get(LOCAL, job).state == "queued"
-
-
-def test_a_queued_job_is_cancelled_at_once(jobs, queue, dataset):
-    job = jobs.add(LOCAL, NewJob("reconstruction", {}, dataset))
-    assert jobs.request_cancel(LOCAL, job.id).state == "cancelled"
-    assert queue.claim() is None
-    with pytest.raises(JobFinished, match="cancelled"):
-        jobs.request_cancel(LOCAL, job.id)
 
 
 def test_a_full_queue_refuses_of_this_tenant_alone(jobs, queue, dataset):

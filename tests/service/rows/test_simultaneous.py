@@ -74,11 +74,12 @@ def test_a_scan_is_deleted_or_has_jobs(jobs, database, dataset, tmp_path):
     assert len(jobs.newest(LOCAL, AT_ONCE)) == (0 if deleted else AT_ONCE - 1)
 
 
-def test_a_queued_job_is_cancelled_once(jobs, dataset):
+def test_a_queued_job_is_cancelled_once(jobs, queue, dataset):
     job = jobs.add(LOCAL, NewJob("reconstruction", {}, dataset)).id
     told = Counter(type(one) for one in together(lambda _: jobs.request_cancel(LOCAL, job)))
     assert told == {JobRow: 1, JobFinished: AT_ONCE - 1}
     assert states(jobs, job) == ["queued", "cancelled"]
+    assert queue.claim() is None
 
 
 def test_running_job_is_cancelled_once(jobs, queue, dataset):

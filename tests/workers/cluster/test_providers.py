@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
@@ -150,15 +149,6 @@ def test_a_library_that_is_not_installed_is_named_with_its_extra(
         monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(InvalidInput, match=rf"pip install 'bentray\[{kind}\]'"):
         open_cluster(kind=kind, template=DEPLOY / kind / "cluster.yaml")
-
-
-def test_no_library_is_imported_unless_it_is_chosen() -> None:
-    code = (
-        "import sys, bentray_workers.cluster.connection\n"
-        "print([name for name in ('dask_jobqueue', 'dask_kubernetes') if name in sys.modules])"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
 
 
 def test_every_kind_that_needs_a_library_has_an_extra() -> None:

@@ -3,7 +3,6 @@
 import io
 import pickle
 import struct
-import tracemalloc
 import zipfile
 import zlib
 from pathlib import Path
@@ -20,6 +19,7 @@ from bentray_workers.foreign_scans import convert_dataset
 from bentray_workers.foreign_scans.matlab import Matlab5
 
 from ...kernels.acquisition.traces import scan
+from ...memory_program import peak_of
 from .scans import (
     ELEMENTS,
     RATE_HZ,
@@ -259,7 +259,7 @@ def _header(shape: tuple[int, ...], dtype: str = "<f8") -> bytes:
 def test_an_archive_that_declares_more_than_it_holds_is_rejected_without_the_memory(tmp_path, shape):
     with zipfile.ZipFile(tmp_path / "scan.npz", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("element_position_m.npy", _header(shape) + bytes(800))
-    assert _refused_in_little_memory(tmp_path, "scan.npz") < 8 << 20
+    assert peak_of(lambda: refused(tmp_path / "scan.npz")) < 8 << 20
 
 
 def test_bombs_are_not_unpacked(tmp_path):
@@ -282,16 +282,7 @@ def test_bombs_are_not_unpacked(tmp_path):
     (tmp_path / "scan.mat").write_bytes(start + struct.pack("<II", 15, len(body)) + body)
     # SciPy unpacks 128 KiB of a file at once, at most 1032 times as much.
     for name, most in (("scan.npz", 32 << 20), ("scan.mat", 140 << 20)):
-        assert _refused_in_little_memory(tmp_path, name) < most
-
-
-def _refused_in_little_memory(tmp_path: Path, name: str) -> int:
-    tracemalloc.start()
-    try:
-        refused(tmp_path / name)
-        return tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
+        assert peak_of(lambda name=name: refused(tmp_path / name)) < most
 
 
 def test_flipped_bit_in_an_archive_fails_its_checksum(tmp_path):

@@ -1,7 +1,6 @@
 """Plans of the largest datasets that are taken: of counts alone, in steps and memory that do not grow."""
 
 import sys
-import tracemalloc
 from dataclasses import replace
 
 import pytest
@@ -31,6 +30,7 @@ from bentray_workers.simulation.parts import count_of, parts_of
 from bentray_workers.simulation.request import PhantomScan
 from bentray_workers.simulation.simulation_planning import plan_simulation
 
+from ...memory_program import peak_of
 from ..files.datasets import datasets
 
 WAYS = [
@@ -81,12 +81,7 @@ def steps(work):
         work()
     finally:
         sys.settrace(before)
-    tracemalloc.start()
-    try:
-        work()
-        return count, tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
+    return count, peak_of(work)
 
 
 @pytest.mark.parametrize("way", WAYS, ids=str)

@@ -1,6 +1,5 @@
 """The planned memory of a reflection image is what its tasks allocate; it grows with the scan."""
 
-import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -22,6 +21,8 @@ from bentray_workers.reconstruction.memory.reflection_memory import (
     reflection_task_bytes,
     reflection_tasks,
 )
+
+from ....memory_program import peak_of
 
 RADIUS, WATER, CENTRE_HZ, RATE_HZ = 0.03, 1500.0, 1e6, 5e6
 
@@ -77,12 +78,8 @@ def test_tasks_allocate_what_is_planned(elements, samples, water, changes):
     while tasks:
         task = tasks.pop(0)
         # Kernels are compiled or loaded, and FFT plans made.
-        task.function(*task.arguments)
-        tracemalloc.start()
-        result = task.function(*task.arguments)
-        peak = tracemalloc.get_traced_memory()[1]
-        tracemalloc.stop()
-        name = task.function.__name__
+        result, name = task.function(*task.arguments), task.function.__name__
+        peak = peak_of(lambda task=task: task.function(*task.arguments))
         taken[name] = max(peak, taken.get(name, 0))
         tasks += graph.after(task, result)
     assert set(taken) == set(planned)
