@@ -440,17 +440,14 @@ def test_a_restoration_killed_after_the_commit_ends(stored, databases, monkeypat
 
 def test_the_commands(bentray, stored, tmp_path):
     made = bentray("backup", tmp_path / "backup", "--data", stored.data_dir, "--json")
-    assert made.exit_code == 0, made.stderr
     assert json.loads(made.stdout)["items"] == 4
-    again = bentray("backup", tmp_path / "backup", "--data", stored.data_dir)
-    assert (again.exit_code, "complete backup" in again.stderr) == (2, True)
+    again = bentray("backup", tmp_path / "backup", "--data", stored.data_dir, code=2)
+    assert "complete backup" in again.stderr
     done = bentray("restore", tmp_path / "backup", "--data", tmp_path / "new")
-    assert done.exit_code == 0, done.stderr
     assert done.stdout == f"bentray serve --data {tmp_path / 'new'}\n"
     for path in stored.data_dir.glob("tenants/lab/datasets/*"):
         path.unlink()
-    missing = bentray("backup", tmp_path / "other", "--data", stored.data_dir)
-    assert missing.exit_code == 1
+    missing = bentray("backup", tmp_path / "other", "--data", stored.data_dir, code=1)
     assert "missing: lab/ds-" in missing.stdout
-    spoiled = bentray("restore", tmp_path / "other", "--data", tmp_path / "new")
-    assert (spoiled.exit_code, "not empty" in spoiled.stderr) == (2, True)
+    spoiled = bentray("restore", tmp_path / "other", "--data", tmp_path / "new", code=2)
+    assert "not empty" in spoiled.stderr

@@ -17,12 +17,14 @@ Run = Callable[..., Result]
 
 @pytest.fixture
 def bentray(monkeypatch: pytest.MonkeyPatch) -> Run:
-    """Run the command line in this process: ``bentray("simulate", "-o", path)``."""
+    """Run the command line in this process, to an exit code: ``bentray("simulate", "-o", path, code=2)``."""
     # A slow machine would print lines of progress.
     monkeypatch.setattr(progress_bar, "FIRST_LINE_S", 3600.0)
 
-    def run(*words: object) -> Result:
-        return CliRunner().invoke(app, [str(word) for word in words], catch_exceptions=False)
+    def run(*words: object, code: int = 0) -> Result:
+        result = CliRunner().invoke(app, [str(word) for word in words], catch_exceptions=False)
+        assert result.exit_code == code, result.output
+        return result
 
     return run
 

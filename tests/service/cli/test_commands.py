@@ -31,7 +31,6 @@ def test_help_fits_a_narrow_terminal_and_gives_an_example_that_parses(
     monkeypatch.setenv("COLUMNS", "80")
     words = command.split()
     said = bentray(*words, "--help")
-    assert said.exit_code == 0
     example = said.stdout.split("Example:")[1].split("\n\n")[0].split()
     assert example[: len(words) + 1] == ["bentray", *words]
     named()[command].make_context(command, list(example[len(words) + 1 :]))

@@ -24,7 +24,6 @@ def test_figures_and_regions_are_printed_and_drawn(bentray: Run, folder: Path) -
     picture = folder / "comparison.png"
     words = (folder, folder / "truth.npy", "--region", "9.4,0,18", "-o", picture)
     result = bentray("compare", *words, "--json")
-    assert result.exit_code == 0, result.stderr
     record = json.loads(result.stdout)
     image, true = made(48).speed, truth(48).sound_speed_mps
     object_ = true != 1500.0

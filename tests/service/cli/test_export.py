@@ -28,13 +28,11 @@ def folder(tmp_path: Path) -> Path:
 def test_every_suffix_is_written(bentray: Run, folder: Path, suffix: str) -> None:
     target = folder / f"image{suffix}"
     result = bentray("export", folder, "-o", target, "--json")
-    assert result.exit_code == 0, result.stderr
     assert json.loads(result.stdout)["format"] == SUFFIXES[suffix]
     assert target.exists()
     if SUFFIXES[suffix] == "hdf5":
         np.testing.assert_array_equal(read_reconstruction(target).speed, made(nodes=6).speed)
-    again = bentray("export", folder, "-o", target)
-    assert again.exit_code == 2
+    again = bentray("export", folder, "-o", target, code=2)
     assert "exists" in again.stderr
 
 
@@ -49,6 +47,6 @@ def test_quantity_and_unit_are_options(bentray: Run, folder: Path) -> None:
     target, source = folder / "loss.nii", folder / "reconstruction.h5"
     how = ("--quantity", "attenuation", "--attenuation", "dB/cm/MHz")
     for more, factor in (((), 0.0868589), (("--frequency", 2e6, "--force"), 0.0434294)):
-        assert bentray("export", source, "-o", target, *how, *more).exit_code == 0
+        bentray("export", source, "-o", target, *how, *more)
         expected = factor * made(nodes=6).attenuation
         np.testing.assert_allclose(nibabel.load(target).get_fdata(), expected, rtol=1e-5)

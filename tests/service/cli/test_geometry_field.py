@@ -28,7 +28,6 @@ def mesh(tmp_path: Path) -> Path:
 def test_a_field_and_its_pictures(bentray: Run, mesh: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     result = bentray("geometry-field", mesh, "-o", out, *SMALL, *PICTURE, "--mode", "refract")
-    assert result.exit_code == 0, result.stderr
     assert "320 faces, closed, genus 1" in result.stdout
     for name, size in (("image", (32, 24)), ("geometry-image", (33, 33)), ("normal-map", (33, 33))):
         assert Image.open(out / f"{name}.png").size == size
@@ -48,7 +47,6 @@ def test_a_field_is_made_once(
 
     def figures(*words: object) -> dict[str, Any]:
         result = bentray("geometry-field", mesh, "-o", out, *SMALL, *PICTURE, "--json", *words)
-        assert result.exit_code == 0, result.stderr
         return dict(json.loads(result.stdout))
 
     first = figures()
@@ -67,9 +65,8 @@ def test_interrupted_field_is_resumed(
         raise KeyboardInterrupt
 
     monkeypatch.setattr(geometry_field, "finish", broken)
-    assert bentray("geometry-field", mesh, "-o", tmp_path / "out", *SMALL, *PICTURE).exit_code == 130
+    bentray("geometry-field", mesh, "-o", tmp_path / "out", *SMALL, *PICTURE, code=130)
     monkeypatch.undo()
     monkeypatch.setattr(geometry_field, "parameterise_mesh", None)
-    result = bentray("geometry-field", mesh, "-o", tmp_path / "out", *SMALL, *PICTURE)
-    assert result.exit_code == 0, result.stderr
+    bentray("geometry-field", mesh, "-o", tmp_path / "out", *SMALL, *PICTURE)
     assert not list((tmp_path / "out").glob("*-unfinished"))

@@ -15,7 +15,6 @@ from .conftest import Run
 
 def made(bentray: Run, data: Path, *words: object) -> dict[str, Any]:
     result = bentray("keys", "create", "--name", "one", "--data", data, "--json", *words)
-    assert result.exit_code == 0, result.stderr
     found: dict[str, Any] = json.loads(result.stdout)
     return found
 
@@ -32,7 +31,7 @@ def test_made_listed_and_revoked(bentray: Run, tmp_path: Path) -> None:
     assert "clinic" in table
     assert "never" in table
     revoked = bentray("keys", "revoke", key["id"], "--data", tmp_path)
-    assert (revoked.exit_code, revoked.stdout) == (0, f"{key['id']} of clinic revoked\n")
+    assert revoked.stdout == f"{key['id']} of clinic revoked\n"
     listed = bentray("keys", "list", "--data", tmp_path, "--tenant", "clinic", "--json")
     assert json.loads(listed.stdout)[0]["state"] == "revoked"
 
@@ -42,15 +41,14 @@ def test_a_lost_database_is_not_replaced_by_a_key(bentray: Run, tmp_path: Path) 
     assert "delete this file" in (tmp_path / GUARDED).read_text()
     (tmp_path / "bentray.sqlite").unlink()
     for command in (("keys", "create", "--name", "two"), ("keys", "list"), ("projects", "list"), ("verify",)):
-        refused = bentray(*command, "--data", tmp_path)
-        assert (refused.exit_code, "bentray restore" in refused.stderr) == (2, True), command
+        assert "bentray restore" in bentray(*command, "--data", tmp_path, code=2).stderr, command
     assert not (tmp_path / "bentray.sqlite").exists()
 
 
 @pytest.mark.parametrize("tenant", ["user-" + "0" * 40, "project-0123456789abcdef0123"])
 def test_the_tenant_of_a_user_or_project_has_no_keys(bentray: Run, tmp_path: Path, tenant: str) -> None:
-    refused = bentray("keys", "create", "--name", "one", "--data", tmp_path, "--tenant", tenant)
-    assert (refused.exit_code, refused.stderr.count("\n")) == (2, 1)
+    refused = bentray("keys", "create", "--name", "one", "--data", tmp_path, "--tenant", tenant, code=2)
+    assert refused.stderr.count("\n") == 1
     assert "BENTRAY_OIDC_TENANTS" in refused.stderr
     assert not (tmp_path / GUARDED).exists()
 
@@ -83,9 +81,8 @@ def test_new_key_is_valid_in_a_running_service(
 
 
 def test_audit_of_an_empty_folder(bentray: Run, tmp_path: Path) -> None:
-    assert bentray("audit", "--data", tmp_path / "gone").stderr.startswith("bentray: data_dir: found ")
-    made(bentray, tmp_path)
-    assert bentray("audit", "--data", tmp_path, "--since", "today").stderr.startswith(
-        "bentray: since: found "
-    )
+    for words, field in (((tmp_path / "gone",), "data_dir"), ((tmp_path, "--since", "today"), "since")):
+        refused = bentray("audit", "--data", *words, code=2)
+        assert refused.stderr.startswith(f"bentray: {field}: found ")
+        made(bentray, tmp_path)
     assert json.loads(bentray("audit", "--data", tmp_path, "--json").stdout) == []

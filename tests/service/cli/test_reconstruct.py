@@ -34,7 +34,6 @@ def test_it_writes_volume_picture_and_figures(
     result = bentray(
         "reconstruct", scan_file, "-o", tmp_path / "new" / "out", *QUICK, "--rays", "straight", "--json"
     )
-    assert result.exit_code == 0
     said = json.loads(result.stdout)
     folder = tmp_path / "new" / "out"
     assert sorted(path.name for path in folder.iterdir()) == [
@@ -62,7 +61,6 @@ def test_without_json_it_ends_with_a_table_and_the_paths(
     bentray: Run, scan_file: Path, tmp_path: Path
 ) -> None:
     result = bentray("reconstruct", scan_file, "-o", tmp_path, *QUICK)
-    assert result.exit_code == 0
     assert result.stdout.splitlines()[-3:] == [
         str(tmp_path / f"reconstruction.{kind}") for kind in ("h5", "png", "json")
     ]
@@ -73,7 +71,6 @@ def test_without_json_it_ends_with_a_table_and_the_paths(
 def test_auto_prints_its_choice_and_reason_in_one_line(bentray: Run, scan_file: Path, tmp_path: Path) -> None:
     words = ("--method", "auto", "--resolution-check", "--workers", 1)
     result = bentray("reconstruct", scan_file, "-o", tmp_path, *QUICK, *words)
-    assert result.exit_code == 0
     told = [line for line in result.stdout.splitlines() if line.startswith("auto chose ")]
     said = json.loads((tmp_path / "reconstruction.json").read_text())
     assert told == [said["reason"]]

@@ -21,8 +21,7 @@ def busy() -> Iterator[int]:
 
 
 def test_a_busy_port_is_rejected_before_anything_starts(bentray: Run, busy: int, tmp_path: Path) -> None:
-    result = bentray("serve", "--port", busy, "--data", tmp_path / "data")
-    assert result.exit_code == 2
+    result = bentray("serve", "--port", busy, "--data", tmp_path / "data", code=2)
     assert result.stderr.startswith(f"bentray: port: found {busy} on 127.0.0.1 (Address already in use)")
     assert "0 picks one" in result.stderr
     assert not (tmp_path / "data").exists()
@@ -30,8 +29,7 @@ def test_a_busy_port_is_rejected_before_anything_starts(bentray: Run, busy: int,
 
 def test_a_host_that_is_not_of_this_machine_is_rejected(bentray: Run, tmp_path: Path) -> None:
     # 192.0.2.0/24 is reserved for documentation (RFC 5737), so no machine has it.
-    result = bentray("serve", "--host", "192.0.2.1", "--port", 0, "--data", tmp_path)
-    assert result.exit_code == 2
+    result = bentray("serve", "--host", "192.0.2.1", "--port", 0, "--data", tmp_path, code=2)
     assert result.stderr.startswith("bentray: host: found '192.0.2.1'")
 
 
@@ -55,8 +53,7 @@ def test_a_bad_setting_is_named_as_it_was_given(
     bentray: Run, monkeypatch: pytest.MonkeyPatch, words: tuple[object, ...]
 ) -> None:
     monkeypatch.setenv("BENTRAY_PORT", "http")
-    result = bentray("serve", *words)
-    assert result.exit_code == 2
+    result = bentray("serve", *words, code=2)
     assert result.stderr.startswith("bentray: BENTRAY_PORT: found 'http'; accepted: ")
 
 
@@ -67,7 +64,7 @@ def test_an_option_wins_over_the_environment(
     monkeypatch.setenv("BENTRAY_JOBS_AT_ONCE", "3")
     seen = []
     monkeypatch.setattr(module, "_run", lambda settings, *_: seen.append(settings))
-    assert bentray("serve", "--port", 0, "--data", tmp_path, "--workers", 2).exit_code == 0
+    bentray("serve", "--port", 0, "--data", tmp_path, "--workers", 2)
     assert (seen[0].workers, seen[0].jobs_at_once, seen[0].data_dir) == (2, 3, tmp_path)
 
 
@@ -88,8 +85,7 @@ def test_reachability_is_shown() -> None:
 def test_remote_access_needs_a_proxy_and_keys(
     bentray: Run, tmp_path: Path, words: tuple[str, ...], found: str, accepted: str
 ) -> None:
-    result = bentray("serve", "--host", "0.0.0.0", *words, "--port", 0, "--data", tmp_path)
-    assert result.exit_code == 2
+    result = bentray("serve", "--host", "0.0.0.0", *words, "--port", 0, "--data", tmp_path, code=2)
     assert "Traceback" not in result.stderr
     last = result.stderr.splitlines()[-1]
     assert f": found {found}" in last
@@ -102,8 +98,7 @@ def test_start_failure_is_one_line(bentray: Run, monkeypatch: pytest.MonkeyPatch
         raise InvalidInput("scheduler_address", "tcp://127.0.0.1:1", "a running scheduler")
 
     monkeypatch.setattr("bentray_service.app.open_cluster", unreachable)
-    result = bentray("serve", "--port", 0, "--data", tmp_path, "--scheduler", "tcp://127.0.0.1:1")
-    assert result.exit_code == 2
+    result = bentray("serve", "--port", 0, "--data", tmp_path, "--scheduler", "tcp://127.0.0.1:1", code=2)
     assert "Traceback" not in result.stderr
     assert result.stderr.endswith(
         "bentray: scheduler_address: found tcp://127.0.0.1:1; accepted: a running scheduler\n"

@@ -37,11 +37,9 @@ def test_sound_first_seen_and_orphan(bentray: Run, tmp_path: Path, stored: tuple
     found = []
     for _ in range(2):
         result = bentray("verify", "--data", tmp_path, "--json")
-        assert result.exit_code == 0, result.stderr
         found.append(json.loads(result.stdout)["counts"])
     assert found == [{"sound": 1, "first seen": 1, "orphan": 1}, {"sound": 2, "orphan": 1}]
     result = bentray("verify", "--data", tmp_path, "--remove-orphans")
-    assert result.exit_code == 0, result.stderr
     assert [path.exists() for path in stored] == [True, True, False]
 
 
@@ -55,9 +53,8 @@ def test_damage_is_named_until_it_is_restored(
         path.unlink()
     else:
         path.write_bytes(content[:-1] + b"?" if spoil == "flip" else content[:3])
-    result = bentray("verify", "--data", tmp_path)
-    assert result.exit_code == 1
+    result = bentray("verify", "--data", tmp_path, code=1)
     assert result.stderr.endswith("bentray: 1 of 3 stored items are damaged\n")
     assert f"damaged: local datasets/{path.name}" in result.stdout
     path.write_bytes(content)
-    assert bentray("verify", "--data", tmp_path).exit_code == 0
+    bentray("verify", "--data", tmp_path)

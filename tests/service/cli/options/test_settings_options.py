@@ -65,14 +65,14 @@ def test_each_option_sets_its_own_setting_and_no_other(
 ) -> None:
     scan = tmp_path / "scan.h5"
     scan.touch()
-    bentray("reconstruct", scan, "-o", tmp_path / "out", *words)
+    bentray("reconstruct", scan, "-o", tmp_path / "out", *words, code=2)
     assert received == [Settings.from_values(**{name: value})]
 
 
 def test_several_are_taken_together(bentray: Run, received: list[Settings], tmp_path: Path) -> None:
     (tmp_path / "scan.h5").touch()
     words = ("--iterations", 2, "--nodes", 64, "--penalty-strength", 2)
-    bentray("reconstruct", tmp_path / "scan.h5", "-o", tmp_path / "out", *words)
+    bentray("reconstruct", tmp_path / "scan.h5", "-o", tmp_path / "out", *words, code=2)
     assert received == [Settings.from_values(iterations=2, nodes=64, penalty_strength=2.0)]
 
 

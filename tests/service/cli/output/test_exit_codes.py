@@ -89,8 +89,7 @@ def test_service_responses_map_to_exit_codes(
     ],
 )
 def test_invalid_arguments_exit_with_code_2_and_one_line(bentray: Run, words: list[str], line: str) -> None:
-    result = bentray(*words)
-    assert result.exit_code == 2
+    result = bentray(*words, code=2)
     assert result.stderr.count("\n") == 1
     assert result.stderr.startswith(f"bentray: {line}")
 
