@@ -13,11 +13,10 @@ import numpy as np
 
 from bentray_workers.files.reconstruction import read_reconstruction
 
+from ..service.tus_records import PIECE, TUS
 from .ledger import LATER, Ledger
 from .machine import PATIENCE_S
 
-TUS = {"Tus-Resumable": "1.0.0"}
-PIECE = {**TUS, "Content-Type": "application/offset+octet-stream"}
 STREAM = {"Content-Type": "application/octet-stream"}
 # How often a request is sent again that was to come later.
 TRIES = 60

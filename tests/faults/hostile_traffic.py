@@ -15,12 +15,11 @@ import numpy as np
 from bentray_workers.files.dataset import write_dataset
 
 from ..service.ingest import hostile_datasets, hostile_meshes, hostile_variants, hostile_volumes
+from ..service.tus_records import PIECE, TUS
 from ..workers.files.datasets import small
 from .hostile_connections import FROM, HostileConnections
 from .ledger import Ledger
 
-TUS = {"Tus-Resumable": "1.0.0"}
-PIECE = {**TUS, "Content-Type": "application/offset+octet-stream"}
 STREAM = {"Content-Type": "application/octet-stream"}
 JSON = {"Content-Type": "application/json"}
 # How long an answer is waited for; whoever is late is left.

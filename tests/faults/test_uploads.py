@@ -16,11 +16,10 @@ import pytest
 from bentray_service.client import Client
 
 from ..free_ports import free_port
+from ..service.tus_records import PIECE, TUS
 from .machine import wait_until
 
 PATIENCE_S = 60.0
-TUS = {"Tus-Resumable": "1.0.0"}
-PIECE = {**TUS, "Content-Type": "application/offset+octet-stream"}
 PROGRAM = (
     "import sys, uvicorn\n"
     "from bentray_service.app import create_app\n"
@@ -98,7 +97,7 @@ def test_upload_survives_a_service_kill(tmp_path):
         head = httpx.head(service.url + location, headers=TUS)
         assert int(head.headers["upload-offset"]) == on_disk
         # The rest of it, and a kill while it is read.
-        headers = {**TUS, "Content-Type": "application/offset+octet-stream", "Upload-Offset": str(on_disk)}
+        headers = {**PIECE, "Upload-Offset": str(on_disk)}
         sent = httpx.patch(
             service.url + location, headers=headers, content=content[on_disk:], timeout=PATIENCE_S
         )

@@ -71,6 +71,12 @@ def signed(
     return {"Authorization": f"Bearer {token.shown()}"}
 
 
+def created(answer: Any, status: int = 201) -> dict[str, Any]:
+    """The record in an answer with that status."""
+    assert answer.status_code == status, answer.text
+    return dict(answer.json())
+
+
 def refused(answer: Any, field: str, accepted: str = "", status: int = 422) -> dict[str, Any]:
     """The problem by which a request was refused: its status, the field at fault, and what is accepted."""
     body = dict(answer.json())
@@ -329,13 +335,7 @@ def http(start: Callable[..., TestClient]) -> TestClient:
 @pytest.fixture
 def uploaded(scan: Callable[..., Path]) -> Callable[[TestClient], str]:
     """Upload the small scan; returns its id."""
-
-    def send(http: TestClient) -> str:
-        answer = http.post("/v1/datasets", content=scan().read_bytes(), headers=HDF5)
-        assert answer.status_code == 201, answer.text
-        return str(answer.json()["id"])
-
-    return send
+    return lambda http: created(http.post("/v1/datasets", content=scan().read_bytes(), headers=HDF5))["id"]
 
 
 @pytest.fixture
@@ -348,9 +348,7 @@ def submitted() -> Callable[..., dict[str, Any]]:
             "dataset": dataset,
             "settings": {"method": "sart", "nodes": 16, "iterations": 3, **settings},
         }
-        answer = http.post("/v1/jobs", json=asked)
-        assert answer.status_code == 202, answer.text
-        return dict(answer.json())
+        return created(http.post("/v1/jobs", json=asked), 202)
 
     return send
 

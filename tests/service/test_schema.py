@@ -17,7 +17,7 @@ from bentray_service.openapi import description
 from bentray_service.rows.keys import ApiKey
 
 from ..effort import effort
-from .conftest import STREAM, npy
+from .conftest import STREAM, created, npy
 
 HERE = Path(__file__).parent
 
@@ -89,9 +89,7 @@ def attack(serve, scan, tmp_path) -> Callable[..., tuple[int, str]]:
             ("volume_id", "/v1/volumes", values),
             ("mesh_id", "/v1/meshes", trimesh.creation.box().export(file_type="ply")),
         ):
-            answer = http.post(path, content=content, headers=STREAM)
-            assert answer.status_code == 201, answer.text
-            found[name] = answer.json()["id"]
+            found[name] = created(http.post(path, content=content, headers=STREAM))["id"]
         asked = {
             "kind": "reconstruction",
             "dataset": found["dataset_id"],

@@ -1,7 +1,9 @@
-"""Records of resumable uploads, waited for."""
+"""Headers of resumable uploads, and their records at their ends."""
 
 from ..waiting import wait_until
 
+TUS = {"Tus-Resumable": "1.0.0"}
+PIECE = {**TUS, "Content-Type": "application/offset+octet-stream"}
 ENDED = ("done", "refused")
 
 

@@ -13,6 +13,8 @@ from bentray_service.rows.ids import LOCAL
 from bentray_service.rows.keys import ApiKey, Keys, Sessions
 from bentray_service.rows.projects import Projects
 
+from ..conftest import STREAM, created
+
 PATIENCE_S = 60.0
 
 
@@ -95,14 +97,8 @@ def test_a_download_is_broken_off(serve, keys, held, monkeypatch):
     values = np.random.default_rng(0).normal(size=(140, 140, 140))
     with caller(url, held[0]) as http:
         given = {"spacing_m": 1e-3, "shape": "140,140,140", "dtype": "float64"}
-        made = http.post(
-            "/v1/volumes",
-            params=given,
-            content=values.tobytes(),
-            headers={"Content-Type": "application/octet-stream"},
-        )
-        assert made.status_code == 201, made.text
-        with http.stream("GET", made.json()["links"]["data"], params={"format": "npy"}) as answer:
+        made = created(http.post("/v1/volumes", params=given, content=values.tobytes(), headers=STREAM))
+        with http.stream("GET", made["links"]["data"], params={"format": "npy"}) as answer:
             assert answer.status_code == 200
             coming = answer.iter_raw(65536)
             next(coming)

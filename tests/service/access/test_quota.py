@@ -1,7 +1,6 @@
 """Storage quota over HTTP: reserved before anything is received, made or run."""
 
 import gzip
-import io
 from concurrent.futures import ThreadPoolExecutor
 from threading import Barrier
 
@@ -13,11 +12,10 @@ from bentray_service.errors import DatabaseUnavailable
 from bentray_service.files.disk import bytes_in
 from bentray_service.rows.ids import LOCAL, new_id
 
-from ..tus_records import settled
+from ..conftest import STREAM, created, npy
+from ..tus_records import PIECE, TUS, settled
 
 HDF5 = {"Content-Type": "application/x-hdf5"}
-BYTES = {"Content-Type": "application/octet-stream"}
-TUS = {"Tus-Resumable": "1.0.0"}
 QUOTA_BYTES = 2_000_000
 
 
@@ -45,11 +43,7 @@ def packed_zeros(count):
 
 
 def volume(http, values):
-    buffer = io.BytesIO()
-    np.save(buffer, values)
-    answer = http.post("/v1/volumes", content=buffer.getvalue(), headers=BYTES)
-    assert answer.status_code == 201, answer.text
-    return answer.json()["id"]
+    return created(http.post("/v1/volumes", content=npy(values), headers=STREAM))["id"]
 
 
 def test_rejected_and_deleted_objects_release_quota(start, scan, uploaded):
@@ -93,12 +87,11 @@ def test_compressed_volume_reserves_its_stored_size(start, in_pieces):
     http, content = start(max_tenant_bytes=QUOTA_BYTES), packed_zeros(11_000_000)
     assert len(content) < QUOTA_BYTES / 50
     if not in_pieces:
-        said = refused(http.post("/v1/volumes", content=content, headers=BYTES))
+        said = refused(http.post("/v1/volumes", content=content, headers=STREAM))
     else:
         kind = {"Upload-Metadata": "kind dm9sdW1l", "Upload-Length": str(len(content))}
         place = http.post("/v1/uploads", headers={**TUS, **kind}).headers["location"]
-        media = {"Content-Type": "application/offset+octet-stream", "Upload-Offset": "0"}
-        assert http.patch(place, content=content, headers={**TUS, **media}).status_code == 204
+        assert http.patch(place, content=content, headers={**PIECE, "Upload-Offset": "0"}).status_code == 204
         problem = settled(http, place)["problem"]
         assert (problem["status"], problem["type"]) == (507, "/problems/quota-used-up")
         said = problem["found"]
@@ -148,7 +141,7 @@ def test_jobs_reserve_quota_for_their_results(start, uploaded, submitted, work, 
 def test_geometry_fields_reserve_their_tables(start):
     http = start(max_tenant_bytes=3_000_000)
     corners = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n"
-    answer = http.post("/v1/meshes", content=f"OFF\n4 4 0\n{corners}".encode(), headers=BYTES)
+    answer = http.post("/v1/meshes", content=f"OFF\n4 4 0\n{corners}".encode(), headers=STREAM)
     # They stay queued.
     http.app.state.background.runner.stop()
     asked = {"kind": "geometry-field", "mesh": answer.json()["id"]}

@@ -27,7 +27,9 @@ from bentray_service.rows.stored_tables import Datasets
 from bentray_service.rows.tables import DatasetRow
 from bentray_service.settings import ServiceSettings
 
+from ..conftest import STREAM, created
 from ..rows.conftest import SUMMARY
+from ..tus_records import TUS
 
 TENANTS = ("clinic", "lab")
 LISTS = ("jobs", "datasets", "volumes", "meshes")
@@ -77,8 +79,7 @@ def used(start, work, uploaded, submitted, until):
             pass
         for member in members.values():
             until(member, submitted(member, uploaded(member))["id"], "succeeded")
-            mesh = {"Content-Type": "application/octet-stream"}
-            assert member.post("/v1/meshes", content=TETRAHEDRON, headers=mesh).status_code == 201
+            created(member.post("/v1/meshes", content=TETRAHEDRON, headers=STREAM))
         return members
 
     return go
@@ -160,7 +161,7 @@ def test_restored_elsewhere_it_serves_the_same_bits(
     begun = clinic.post(
         "/v1/uploads",
         headers={
-            "Tus-Resumable": "1.0.0",
+            **TUS,
             "Upload-Length": "1000",
             "Upload-Metadata": "type ZGF0YXNldA==,filename c2Nhbi5oNQ==",
         },
@@ -188,7 +189,7 @@ def test_restored_elsewhere_it_serves_the_same_bits(
     work.hold.set()
     other = expected["lab"]["volumes"][0]["id"]
     assert again["clinic"].get(f"/v1/volumes/{other}").status_code == 404
-    head = again["clinic"].head(begun.headers["location"], headers={"Tus-Resumable": "1.0.0"})
+    head = again["clinic"].head(begun.headers["location"], headers=TUS)
     assert head.status_code == 404
     for job, ended in truth.items():
         found = until(again["clinic"], job, "succeeded")

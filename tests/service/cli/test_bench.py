@@ -69,16 +69,10 @@ def test_an_unknown_name_lists_the_known_ones(bentray: Run, folder: Path, name: 
     assert result.stderr == f"bentray: name: found {name!r}; accepted: one of empty, fake\n"
 
 
-@pytest.mark.parametrize("name", ["two-words", "two_words"])
-def test_accepts_a_joined_command_line(folder: Path, name: str) -> None:
-    (folder / "table" / "two_words.py").write_text(FAKE)
+@pytest.mark.parametrize("name", ["two-words", "two_words", "distributed"])
+def test_accepts_a_joined_command_line_and_the_name_of_a_package(folder: Path, name: str) -> None:
+    (folder / "table" / f"{name.replace('-', '_')}.py").write_text(FAKE)
     rows = load(name, folder)(QUICK)
-    assert [row.target for row in rows] == ["E1", "E2", "E3"]
-
-
-def test_a_benchmark_may_be_called_as_a_package_is(folder: Path) -> None:
-    (folder / "table" / "distributed.py").write_text(FAKE)
-    rows = load("distributed", folder)(QUICK)
     assert [row.target for row in rows] == ["E1", "E2", "E3"]
     assert Path(str(sys.modules["distributed"].__file__)).name == "__init__.py"
 

@@ -9,6 +9,7 @@ from bentray_service.jobs import runner
 
 from ...waiting import wait_until
 from ..conftest import HDF5
+from ..tus_records import PIECE, TUS
 
 
 @pytest.fixture
@@ -121,12 +122,11 @@ def test_publication_resumes_at_the_next_start(service, publishing, until, s3_se
 def test_an_upload_in_pieces_waits_too(service, scan, s3_server, monkeypatch):
     monkeypatch.setattr("bentray_service.ingest.upload_ingest.PATIENCE_SECONDS", 0.05)
     http, content = service("one"), scan().read_bytes()
-    tus = {"Tus-Resumable": "1.0.0"}
-    begun = http.post("/v1/uploads", headers={**tus, "Upload-Length": str(len(content))})
+    begun = http.post("/v1/uploads", headers={**TUS, "Upload-Length": str(len(content))})
     location = begun.headers["location"]
     s3_server.away.set()
     s3_server.asked.clear()
-    piece = {**tus, "Upload-Offset": "0", "Content-Type": "application/offset+octet-stream"}
+    piece = {**PIECE, "Upload-Offset": "0"}
     assert http.patch(location, content=content, headers=piece).status_code == 204
     wait_until(lambda: any("/datasets/" in path for _, path in list(s3_server.asked)))
     assert http.get(location).json()["state"] == "reading"

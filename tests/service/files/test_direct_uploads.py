@@ -11,7 +11,8 @@ from bentray_service.errors import StorageUnavailable
 from bentray_service.files import direct_uploads
 from bentray_service.files.bucket import Bucket
 
-from ..tus_records import settled
+from ..conftest import created
+from ..tus_records import PIECE, TUS, settled
 
 PLACE = "/v1/direct-uploads"
 
@@ -28,21 +29,18 @@ def objects(bucket_url):
 
 
 def begun(http, data, **more):
-    answer = http.post(PLACE, json={"length": len(data), **more})
-    assert answer.status_code == 201, answer.text
-    return answer.json()
+    return created(http.post(PLACE, json={"length": len(data), **more}))
 
 
 def send(http, upload, data, numbers=None):
     """Send parts as any program does: without the key, and knowing nothing of the service."""
     numbers = numbers or list(range(1, upload["parts"] + 1))
-    answer = http.post(upload["links"]["parts"], json={"numbers": numbers})
-    assert answer.status_code == 200, answer.text
-    for part in answer.json()["parts"]:
+    record = created(http.post(upload["links"]["parts"], json={"numbers": numbers}), 200)
+    for part in record["parts"]:
         begin = (part["number"] - 1) * upload["part_bytes"]
         sent = httpx.put(part["url"], content=data[begin : begin + part["bytes"]])
         assert sent.status_code == 200, sent.text
-    return answer.json()
+    return record
 
 
 def ended(http, upload):
@@ -135,7 +133,7 @@ def test_deletion_and_expiry_empty_the_bucket(service, objects):
     for one in (upload, other):
         send(http, one, b"x" * 10)
     assert len(objects()) == 2
-    assert http.delete(upload["links"]["self"], headers={"Tus-Resumable": "1.0.0"}).status_code == 204
+    assert http.delete(upload["links"]["self"], headers=TUS).status_code == 204
     state = http.app.state
     state.background.housekeeper.forget(state.background.ingest.uploads.get("local", other["id"]))
     assert objects() == []
@@ -178,14 +176,9 @@ def test_a_bucket_that_is_away_is_waited_for(service, scan, s3_server, monkeypat
 def test_the_two_ways_are_not_mixed(service, start, scan):
     http = service()
     upload = begun(http, b"x" * 10)
-    headers = {
-        "Tus-Resumable": "1.0.0",
-        "Upload-Offset": "0",
-        "Content-Type": "application/offset+octet-stream",
-    }
-    answer = http.patch(upload["links"]["self"], content=b"x", headers=headers)
+    answer = http.patch(upload["links"]["self"], content=b"x", headers={**PIECE, "Upload-Offset": "0"})
     assert (answer.status_code, answer.json()["field"]) == (409, "upload")
-    tus = http.post("/v1/uploads", headers={"Tus-Resumable": "1.0.0", "Upload-Length": "9"}).json()["id"]
+    tus = http.post("/v1/uploads", headers={**TUS, "Upload-Length": "9"}).json()["id"]
     assert http.post(f"{PLACE}/{tus}/complete").json()["field"] == "upload"
     local = start("local")
     answer = local.post(PLACE, json={"length": 9})

@@ -7,7 +7,7 @@ import httpx
 import numpy as np
 import pytest
 
-from ..conftest import STREAM, npy
+from ..conftest import STREAM, created, npy
 
 
 def packed(side=12):
@@ -49,9 +49,7 @@ def test_it_is_named(spoiled, asked):
 def test_so_it_is_to_a_job(spoiled, until):
     http, volume, _ = spoiled
     asked = {"kind": "refraction", "volume": volume, "settings": {"frames": 2, "width": 64, "height": 64}}
-    answer = http.post("/v1/jobs", json=asked)
-    assert answer.status_code == 202, answer.text
-    done = until(http, answer.json()["id"])
+    done = until(http, created(http.post("/v1/jobs", json=asked), 202)["id"])
     assert (done["state"], done["error"]["type"]) == ("failed", "/problems/stored-data-damaged")
     assert volume in done["error"]["detail"]
 

@@ -18,7 +18,7 @@ from bentray_workers.rendering.field_settings import FieldSettings
 from bentray_workers.rendering.field_view import FieldView
 from bentray_workers.rendering.geometry_field import build_field, bytes_of
 
-from ..conftest import made_once, refused
+from ..conftest import STREAM, made_once, refused
 
 SMALL = {"width": 32, "height": 24}
 COARSE = {"samples": 6, "inner_samples": 4, "divisions": 4, "image_size": 33}
@@ -55,7 +55,7 @@ def test_from_an_upload_to_a_picture(on_workers, tmp_path, until):
     ring = torus(16, 10)
     content = trimesh.Trimesh(ring.vertices, ring.faces, process=False).export(file_type="ply")
     with on_workers() as http:
-        sent = http.post("/v1/meshes", content=content, headers={"Content-Type": "application/octet-stream"})
+        sent = http.post("/v1/meshes", content=content, headers=STREAM)
         mesh = sent.json()["id"]
         asked = {"kind": "geometry-field", "mesh": mesh, "settings": COARSE}
         job = http.post("/v1/jobs", json=asked).json()
@@ -78,7 +78,7 @@ def test_from_an_upload_to_a_picture(on_workers, tmp_path, until):
             answer = http.get(field["links"][name], params=SMALL if name == "image" else {})
             assert Image.open(io.BytesIO(answer.content)).size == ((32, 24) if name == "image" else (33, 33))
         # The same again, under another id of the same mesh: the same field, at once.
-        twin = http.post("/v1/meshes", content=content, headers={"Content-Type": "application/octet-stream"})
+        twin = http.post("/v1/meshes", content=content, headers=STREAM)
         again = http.post("/v1/jobs", json={**asked, "mesh": twin.json()["id"]}).json()
         done = until(http, again["id"])
         assert (done["state"], done["field"]) == ("succeeded", field["id"])

@@ -18,13 +18,9 @@ from bentray_service.rows.ids import LOCAL
 from bentray_service.rows.keys import ApiKey, Keys
 
 from ...small_disk import fill
+from ..conftest import STREAM
 from ..held_database import held
-
-STREAM = {"Content-Type": "application/octet-stream"}
-
-
-TUS = {"Tus-Resumable": "1.0.0"}
-
+from ..tus_records import TUS
 
 JOB = {"kind": "simulation", "settings": {"nodes": 16, "elements": 16}}
 
@@ -126,7 +122,7 @@ def test_every_route_while_postgresql_is_dead(start, scan, postgresql_server, ke
             ("GET", f"{FIELD}/slice.png", {}),
             ("POST", "/v1/jobs", {"json": JOB}),
             ("POST", "/v1/datasets", {"content": content, "headers": HDF5}),
-            ("POST", "/v1/uploads", {"headers": {"Tus-Resumable": "1.0.0", "Upload-Length": "9"}}),
+            ("POST", "/v1/uploads", {"headers": {**TUS, "Upload-Length": "9"}}),
             ("DELETE", f"/v1/datasets/{dataset}", {}),
         ):
             is_away(http.request(method, path, **sent))

@@ -20,6 +20,7 @@ from bentray_service.webhooks import sender
 
 from ...waiting import wait_until
 from ..cli.conftest import bentray as command
+from ..conftest import created
 from .local_receiver import Receiver
 
 __all__ = ["command"]
@@ -191,10 +192,9 @@ def test_every_job_of_a_batch(called, receiver):
     http, _, _ = called
     dataset = http.get("/v1/datasets").json()["datasets"][0]["id"]
     request = {"datasets": [dataset], "settings": {"method": "sart", "nodes": 16}, "webhook": receiver.url}
-    batch = http.post("/v1/batches", json=request)
-    assert batch.status_code == 202, batch.text
+    batch = created(http.post("/v1/batches", json=request), 202)
     receiver.wait(1)
-    assert json.loads(receiver.messages[0][1])["data"]["job"] == batch.json()["jobs"][0]["id"]
+    assert json.loads(receiver.messages[0][1])["data"]["job"] == batch["jobs"][0]["id"]
 
 
 SENDING = """

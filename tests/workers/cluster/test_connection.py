@@ -137,8 +137,3 @@ def test_rejects_hosts_that_are_no_scheduler(answer):
             open_cluster(f"tcp://127.0.0.1:{server.getsockname()[1]}", connect_timeout_s=0.5)
         thread.join(60.0)
     assert not thread.is_alive()
-
-
-def test_no_workers_is_rejected():
-    with pytest.raises(InvalidInput, match="workers"):
-        open_cluster(workers=0)

@@ -27,20 +27,13 @@ def test_new_entries_evict_old_ones_in_every_cache(worker):
     assert (first.held(), two.held()) == (30 * MIB, 10 * MIB)
 
 
-def test_a_job_finds_little_kept(worker, tmp_path):
+@pytest.mark.parametrize(
+    ("limited", "job", "kept"), [(True, True, (10,)), (False, True, (30, 10)), (True, False, (30, 10))]
+)
+def test_a_job_alone_finds_little_kept_where_memory_is_limited(request, tmp_path, limited, job, kept):
+    if limited:
+        request.getfixturevalue("worker")
     store = MemoryCache(1000 * MIB)
     store.get("a", 30 * MIB, str)
     store.get("b", 10 * MIB, str)
-    assert marked(tmp_path / "marker", True, store.held) == 10 * MIB
-
-
-def test_without_a_limit_all_is_kept(tmp_path):
-    store = MemoryCache(1000 * MIB)
-    store.get("a", 900 * MIB, str)
-    assert marked(tmp_path / "marker", True, store.held) == 900 * MIB
-
-
-def test_a_task_that_draws_finds_all_that_is_kept(worker, tmp_path):
-    store = MemoryCache(1000 * MIB)
-    store.get("a", 90 * MIB, str)
-    assert marked(tmp_path / "marker", False, store.held) == 90 * MIB
+    assert marked(tmp_path / "marker", job, store.held) == sum(kept) * MIB

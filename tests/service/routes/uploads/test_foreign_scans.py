@@ -13,8 +13,7 @@ from bentray_service.routes.uploads.upload_metadata import read_metadata
 from ....workers.foreign_scans.hdf5_scans import openusct_fields, write_fields, zea_fields
 from ....workers.foreign_scans.kit_measurement import write_measurement, zipped
 from ....workers.foreign_scans.scans import delta_tof, positions, travel_times, waveforms, write_matlab73
-
-BINARY = {"Content-Type": "application/octet-stream"}
+from ...conftest import STREAM, created
 
 
 def matlab(variables: dict[str, np.ndarray]) -> bytes:
@@ -42,9 +41,7 @@ def test_they_are_taken(start, tmp_path, kind):
         content = made.getvalue()
     else:
         content = matlab(waveforms() if kind == "traces" else travel_times())
-    answer = start().post("/v1/datasets", content=content, headers=BINARY)
-    assert answer.status_code == 201, answer.text
-    body = answer.json()
+    body = created(start().post("/v1/datasets", content=content, headers=STREAM))
     assert (body["elements"], body["ntx"], body["nrx"]) == (8, 8, 8)
     assert (body["has_traces"], body["has_travel_times"]) == (kind == "traces", kind != "traces")
 
@@ -55,14 +52,12 @@ def test_scans_of_other_projects_are_taken(start, tmp_path, kind):
         source = zipped(write_measurement(tmp_path / "scan"), tmp_path / "scan.zip")
     else:
         source = write_fields(tmp_path / "scan", zea_fields() if kind == "zea" else openusct_fields())
-    answer = start().post("/v1/datasets", content=source.read_bytes(), headers=BINARY)
-    assert answer.status_code == 201, answer.text
-    body = answer.json()
+    body = created(start().post("/v1/datasets", content=source.read_bytes(), headers=STREAM))
     assert (body["ntx"], body["dimension"], body["has_traces"]) == (3, 3 if kind == "kit" else 2, True)
 
 
 def test_the_field_at_fault_is_named(start):
-    answer = start().post("/v1/datasets", content=matlab({"delta_tof": delta_tof()}), headers=BINARY)
+    answer = start().post("/v1/datasets", content=matlab({"delta_tof": delta_tof()}), headers=STREAM)
     assert answer.status_code == 422
     assert answer.headers["content-type"] == "application/problem+json"
     assert answer.json()["field"] == "element_positions"
@@ -78,15 +73,14 @@ def own_variables() -> bytes:
 
 def test_own_variables_and_units_are_stated_in_the_request(start):
     service = start()
-    refused = service.post("/v1/datasets", content=own_variables(), headers=BINARY)
+    refused = service.post("/v1/datasets", content=own_variables(), headers=STREAM)
     assert refused.status_code == 422
     assert "pos" in refused.json()["found"]
-    taken = service.post(f"/v1/datasets?{OWN}", content=own_variables(), headers=BINARY)
-    assert taken.status_code == 201, taken.text
-    assert taken.json()["water_speed_mps"] == pytest.approx(1494.1, abs=0.5)
-    assert "assumed" not in taken.json()["source"]
+    taken = created(service.post(f"/v1/datasets?{OWN}", content=own_variables(), headers=STREAM))
+    assert taken["water_speed_mps"] == pytest.approx(1494.1, abs=0.5)
+    assert "assumed" not in taken["source"]
     for query in ("unit=inch", "map=x%3Dy", "temperature_c=1e9", "temperature_c=x", "map=%00"):
-        wrong = service.post(f"/v1/datasets?{query}", content=own_variables(), headers=BINARY)
+        wrong = service.post(f"/v1/datasets?{query}", content=own_variables(), headers=STREAM)
         assert wrong.status_code == 422, query
 
 

@@ -10,12 +10,12 @@ from bentray_workers.files.dataset import write_dataset
 
 from ....effort import effort
 from ....workers.files.datasets import small
+from ...conftest import STREAM
 from ...ingest import hostile_datasets, hostile_meshes, hostile_volumes
 from ...ingest.damage import damaged
 
 pytestmark = pytest.mark.ingest_process
 
-STREAM = {"Content-Type": "application/octet-stream"}
 # Resident memory that the service may gain while it refuses some dozens of files.
 MAX_GROWTH = 100 * 2**20
 

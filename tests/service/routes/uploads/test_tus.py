@@ -16,10 +16,7 @@ from bentray_service.ingest.upload_ingest import UploadLimits
 from bentray_service.rows.tables import ExpiredRow, UploadRow
 
 from ...conftest import NoProjects, npy
-from ...tus_records import settled
-
-TUS = {"Tus-Resumable": "1.0.0"}
-PIECE = {**TUS, "Content-Type": "application/offset+octet-stream"}
+from ...tus_records import PIECE, TUS, settled
 
 
 def metadata(**said):
