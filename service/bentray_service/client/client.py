@@ -16,9 +16,18 @@ from tenacity import AsyncRetrying, Retrying
 
 from ..web.outbound import AsyncTransport, Transport
 from . import flows, lists, waiting
-from .connection import Connection, saving
+from .connection import (
+    CHUNK_BYTES,
+    Connection,
+    DownloadStep,
+    EventStep,
+    Flow,
+    PauseStep,
+    RequestStep,
+    Step,
+    saving,
+)
 from .errors import ClientError, from_response, no_answer
-from .steps import CHUNK_BYTES, DownloadStep, EventStep, Flow, PauseStep, RequestStep, Step
 
 T = TypeVar("T")
 P = ParamSpec("P")

@@ -19,11 +19,10 @@ from ..routes.models.job_records import DatasetRecord, JobRecord, VolumeRecord
 from ..routes.models.name_changes import LengthUnit, TimeUnit
 from ..routes.models.surface_records import MeshRecord
 from ..settings_request import check_setting_names, nested, plain_numbers
-from .connection import Connection
+from .connection import Connection, DownloadStep, Flow, RequestStep
 from .errors import ClientError
 from .lists import Answer, BatchId, DatasetId, JobId, StoredId, VolumeId, answer, id_of, volume_of
 from .lists import volume as volume_record
-from .steps import DownloadStep, Flow, RequestStep
 from .uploading import PLACES, OnBytes, UploadKind, send_direct, send_file
 from .waiting import wait
 

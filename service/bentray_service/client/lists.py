@@ -34,9 +34,8 @@ from ..routes.models.project_records import (
 from ..routes.models.quality_records import QualityRecord
 from ..routes.models.surface_records import MeshList, MeshRecord
 from ..settings_request import check_setting_names
-from .connection import Connection
+from .connection import Connection, Flow, RequestStep
 from .errors import ClientError
-from .steps import Flow, RequestStep
 
 if TYPE_CHECKING:
     from ..interactive.setting_types import RefractionSettings

@@ -12,9 +12,9 @@ import httpx
 from bentray_kernels.errors import InvalidInput
 
 from ..routes.models.upload_records import DirectUploadRecord, PartAddresses, UploadRecord
+from .connection import CHUNK_BYTES, Flow, PauseStep, RequestStep
 from .errors import ClientError, NoAnswer, from_problem
 from .lists import answer
-from .steps import CHUNK_BYTES, Flow, PauseStep, RequestStep
 
 UploadKind = Literal["dataset", "volume", "mesh"]
 OnBytes = Callable[[int, int], None]

@@ -8,10 +8,9 @@ from collections.abc import Callable
 from ..interactive.progress_bar import phase_note, progress_bar
 from ..routes.models.batch_records import BatchRecord
 from ..routes.models.job_records import JobRecord
-from .connection import Connection
+from .connection import Connection, EventStep, Flow, PauseStep, RequestStep
 from .errors import ClientError, from_problem
 from .lists import BatchId, JobId, id_of
-from .steps import EventStep, Flow, PauseStep, RequestStep
 
 # Time limit for a line of the event stream, s; the service sends one at least every 15 s.
 SILENCE_S = 40.0

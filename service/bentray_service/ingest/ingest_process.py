@@ -120,7 +120,7 @@ def convert_upload(
 
 def _dataset(source: Path, target: Path, given: dict[str, Any], on_size: OnSize) -> dict[str, Any]:
     if CORRECTION in given:
-        from bentray_workers.files.dataset.correct import Correction, correct_dataset
+        from bentray_workers.files.dataset.copy import Correction, correct_dataset
 
         correction = Correction(**given[CORRECTION])
         return record_of(correct_dataset(source, target, correction, origin=given["origin"], on_size=on_size))

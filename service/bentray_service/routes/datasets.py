@@ -13,7 +13,7 @@ from starlette.concurrency import run_in_threadpool
 
 from bentray_kernels.requests.limits import FREQUENCY_HZ, SPEED_MPS, TEMPERATURE_C
 from bentray_kernels.requests.names import DEFAULT_PICKER, PickerName
-from bentray_workers.files.dataset.correct import Correction
+from bentray_workers.files.dataset.copy import Correction
 from bentray_workers.foreign_scans.scan_metadata import FIELDS, UNITS
 
 from ..ingest.canonical import add_corrected

@@ -6,7 +6,7 @@ from html import escape
 
 from bentray_workers.files import mesh_formats, volume_formats
 from bentray_workers.foreign_scans.conversion import READERS
-from bentray_workers.foreign_scans.scan_reader import Variable
+from bentray_workers.foreign_scans.open_scan import Variable
 
 from .documents import document, table
 

@@ -12,9 +12,8 @@ import tenacity
 from tenacity import Retrying
 
 from bentray_service.client import AsyncClient, Client, ClientError, connection, flows, uploading
-from bentray_service.client.connection import Connection, Retries
+from bentray_service.client.connection import Connection, DownloadStep, RequestStep, Retries
 from bentray_service.client.errors import NoAnswer
-from bentray_service.client.steps import DownloadStep, RequestStep
 from bentray_service.settings import ServiceSettings
 
 from ...free_ports import free_port

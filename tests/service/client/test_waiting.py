@@ -4,9 +4,8 @@ import json
 
 import pytest
 
-from bentray_service.client.connection import Connection
+from bentray_service.client.connection import Connection, EventStep, PauseStep, RequestStep
 from bentray_service.client.errors import ClientError, NoAnswer
-from bentray_service.client.steps import EventStep, PauseStep, RequestStep
 from bentray_service.client.waiting import STREAMS, wait
 from bentray_service.routes.models.job_records import JobRecord
 

@@ -17,9 +17,8 @@ from . import kit, kwave, layouts, openusct, zea
 from .arrays import Arrays
 from .layouts import named_layout
 from .matlab import Matlab73
-from .open_scan import OpenScan, open_scan
+from .open_scan import Layout, OpenScan, ScanReader, open_scan
 from .scan_metadata import POSITION, ArraysWithMetadata, ScanMetadata
-from .scan_reader import Layout, ScanReader
 
 # A new format is one file and one entry; the first that detects a file reads it.
 READERS: tuple[ScanReader, ...] = (

@@ -26,8 +26,7 @@ from ..files.zip_checks import WHOLE, check_zip, member_file, naming
 from .arrays import StreamedScan, Traces, read_small
 from .kit_signals import RATE_HZ, UNDERSAMPLING, compress, decode_float16, reconstruct_undersampled
 from .matlab import Matlab5
-from .open_scan import OpenScan
-from .scan_reader import ScanReader, Variable
+from .open_scan import OpenScan, ScanReader, Variable
 
 # The path of the A-scans of an emission; the aperture position is ``TASRotation``.
 EMISSION = re.compile(

@@ -27,8 +27,7 @@ from ..files.hdf5_reading import Reader, opened, rejecting_hdf5_damage
 from ..files.npz import Npz
 from ..files.zip_checks import WHOLE, check_zip, member_file, naming, read_member
 from .arrays import LARGEST_WHOLE
-from .open_scan import OpenScan
-from .scan_reader import ScanReader, Variable
+from .open_scan import OpenScan, ScanReader, Variable
 
 GEOMETRY = "geometry.npz"
 OUTPUT = re.compile(r"(object|water)/[^/]+\.(h5|hdf5)")

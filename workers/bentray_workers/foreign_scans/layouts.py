@@ -16,7 +16,7 @@ from bentray_kernels.requests.limits import check_size
 
 from ..files.dataset.read import NUMBERS, PAIR_ARRAYS, trace_type
 from .arrays import Arrays, read_small
-from .scan_reader import Layout, ScanReader, Variable
+from .open_scan import Layout, ScanReader, Variable
 
 # Tolerance of the time axis, relative to its step.
 UNEVEN = 0.01

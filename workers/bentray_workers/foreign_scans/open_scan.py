@@ -1,9 +1,9 @@
-"""Opening a foreign scan by its content: MATLAB 5, HDF5, a zip, or a folder."""
+"""Opening a foreign scan by its content: MATLAB 5, HDF5, a zip, or a folder; and the record of a reader."""
 
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,6 +11,7 @@ from pathlib import Path
 
 import h5py
 
+from bentray_kernels.acquisition import Dataset
 from bentray_kernels.errors import InvalidInput
 
 from ..files import npz
@@ -136,3 +137,52 @@ def open_scan(path: Path, scratch: Path) -> Iterator[OpenScan]:
     else:
         # Empty, or HDF5 after a user block of another program.
         yield OpenScan(scratch)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """A dataset with placeholders for traces, and the names of the arrays with the traces."""
+
+    dataset: Dataset
+    traces: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A variable of a format: name, shape in the order of its program, unit, and meaning.
+
+    Attributes:
+        required: "yes", "no", or a condition.
+    """
+
+    name: str
+    shape: str
+    unit: str
+    meaning: str
+    required: str = "yes"
+
+
+def _arrays(scan: OpenScan) -> Arrays:
+    assert scan.arrays is not None
+    return scan.arrays
+
+
+@dataclass(frozen=True)
+class ScanReader:
+    """A format of scans.
+
+    Attributes:
+        title: heading of its documentation.
+        about: container, source of the format, and conventions.
+        variables: its documentation.
+        detect: whether an open file has this format, by its content.
+        read: its arrays; by default those of the file as they are.
+        layout: the dataset in the arrays; None: under the names of the upload format.
+    """
+
+    title: str
+    about: str
+    variables: tuple[Variable, ...]
+    detect: Callable[[OpenScan], bool]
+    read: Callable[[OpenScan], Arrays] = _arrays
+    layout: Callable[[Arrays], Layout] | None = None

@@ -16,8 +16,7 @@ from bentray_kernels.errors import InvalidInput
 
 from .arrays import StreamedScan, Traces
 from .matlab import rows_of
-from .open_scan import OpenScan
-from .scan_reader import ScanReader, Variable
+from .open_scan import OpenScan, ScanReader, Variable
 
 POSITION, DATA, EMITTERS = "geometry/element_pos", "acquisition/data", "acquisition/tx_elements"
 DATA_SHAPE = "(n_tx, n_samples, n_rx) numbers"

@@ -21,8 +21,7 @@ from ..files.damage import ACCEPTED
 from ..files.hdf5_reading import Reader
 from .arrays import StreamedScan, Traces
 from .matlab import rows_of
-from .open_scan import OpenScan
-from .scan_reader import ScanReader, Variable
+from .open_scan import OpenScan, ScanReader, Variable
 
 # Place of the groups ``data`` and ``scan``: of files of one track, and of files with several.
 TRACKS = ("", "tracks/track_0/")

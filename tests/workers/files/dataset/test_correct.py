@@ -10,7 +10,7 @@ from hypothesis import strategies as some
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.dataset import Correction, copy, correct_dataset, read_dataset, write_dataset
-from bentray_workers.files.dataset.correct import LENGTHS, TIMES, corrected
+from bentray_workers.files.dataset.copy import LENGTHS, TIMES, corrected
 from bentray_workers.files.dataset.units import POSITION_UNITS, TIME_UNITS, propose
 
 from ....memory_program import peak_of

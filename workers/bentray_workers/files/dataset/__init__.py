@@ -1,7 +1,6 @@
 """Dataset files in the upload format ``uct-transmission`` 1.0."""
 
-from .copy import copy_dataset
-from .correct import Correction, correct_dataset
+from .copy import Correction, copy_dataset, correct_dataset
 from .read import read_dataset
 from .write import write_dataset
 
