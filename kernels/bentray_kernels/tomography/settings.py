@@ -33,15 +33,25 @@ ON_DEVICES: Uses = (
     {"method": ("auto",), "minutes": ABOVE_ZERO},
     *ECHOES,
 )
-# No unknown names in JSON.
-FORBID = {"extra": "forbid"}
+
+
+class Checked:
+    """A record of settings, whose fields are checked against their choices and ranges."""
+
+    # No unknown names in JSON.
+    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
+    # Its name in the record that holds it, for errors.
+    PLACE: ClassVar[str] = ""
+
+    def __post_init__(self) -> None:
+        check(self, place=self.PLACE)
 
 
 @dataclass(frozen=True)
-class GaussNewtonSettings:
+class GaussNewtonSettings(Checked):
     """Gauss–Newton: all emitters at once, with a penalty on the image."""
 
-    __pydantic_config__: ClassVar[dict[str, str]] = FORBID
+    PLACE: ClassVar[str] = "gauss_newton"
 
     penalty_strength: float = setting(
         0.3,
@@ -55,15 +65,12 @@ class GaussNewtonSettings:
         ),
     )
 
-    def __post_init__(self) -> None:
-        check(self, place="gauss_newton")
-
 
 @dataclass(frozen=True)
-class PickingSettings:
+class PickingSettings(Checked):
     """Travel times from traces, where only traces were recorded."""
 
-    __pydantic_config__: ClassVar[dict[str, str]] = FORBID
+    PLACE: ClassVar[str] = "picking"
 
     picker: PickerName = setting(  # noqa: RUF009 - a string, by its alias
         DEFAULT_PICKER,
@@ -87,15 +94,12 @@ class PickingSettings:
         used_when=({"examine": (True,)},),
     )
 
-    def __post_init__(self) -> None:
-        check(self, place="picking")
-
 
 @dataclass(frozen=True)
-class AttenuationSettings:
+class AttenuationSettings(Checked):
     """Attenuation, reconstructed along the rays of the speed image; experimental."""
 
-    __pydantic_config__: ClassVar[dict[str, str]] = FORBID
+    PLACE: ClassVar[str] = "attenuation"
 
     enabled: bool = setting(
         True,
@@ -112,15 +116,12 @@ class AttenuationSettings:
         used_when=({"attenuation": (True,)},),
     )
 
-    def __post_init__(self) -> None:
-        check(self, place="attenuation")
-
 
 @dataclass(frozen=True)
-class ReflectionSettings:
+class ReflectionSettings(Checked):
     """Reflection image: delay and sum of echoes along the rays of the speed image."""
 
-    __pydantic_config__: ClassVar[dict[str, str]] = FORBID
+    PLACE: ClassVar[str] = "reflection"
 
     enabled: bool = setting(
         False,
@@ -129,9 +130,6 @@ class ReflectionSettings:
         label="Make a reflection image",
     )
 
-    def __post_init__(self) -> None:
-        check(self, place="reflection")
-
 
 def _record(label: str, description: str) -> dict[str, Any]:
     """The metadata of a record of settings."""
@@ -139,7 +137,7 @@ def _record(label: str, description: str) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class Settings:
+class Settings(Checked):
     """How an image is reconstructed. Each field's metadata holds its description, range and choices.
 
     What is not here is decided automatically, see ``numerics``.
@@ -147,8 +145,6 @@ class Settings:
     Raises:
         InvalidInput: naming the setting, its value and what is accepted.
     """
-
-    __pydantic_config__: ClassVar[dict[str, str]] = FORBID
 
     method: Literal["sart", "gauss-newton", "auto", "waveform"] = setting(
         "auto",
@@ -292,7 +288,7 @@ class Settings:
     )
 
     def __post_init__(self) -> None:
-        check(self)
+        super().__post_init__()
         check_speeds("speed_bounds_mps", self.speed_bounds_mps)
         if self.method == "waveform" and self.decomposition == "volume":
             raise InvalidInput("decomposition", "'volume'", "slices, with method waveform")

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...arrays import Flags
 from ..dataset import Dataset
-from .finding import Finding, Role
+from .finding import ROLES, Finding
 
 # Fraction of an element's pairs that must have a pulse.
 MIN_DETECTED = 0.1
@@ -26,9 +26,7 @@ def find_dead(dataset: Dataset, detected: Flags) -> Iterator[Finding]:
         detected: (ntx, nrx), whether a pair has a pulse or a time.
     """
     other = np.asarray(dataset.tx[:, None] != dataset.rx[None, :])
-    roles: tuple[tuple[Role, int], ...] = (("emission", 1), ("reception", 0))
-    for role, axis in roles:
-        element = dataset.tx if role == "emission" else dataset.rx
+    for role, element, axis in zip(ROLES, (dataset.tx, dataset.rx), (1, 0), strict=True):
         # Pairs with dead elements of the other role are not counted.
         alive = np.asarray(detected.any(axis=1 - axis))
         pairs_counted = other & (alive[None, :] if axis == 1 else alive[:, None])

@@ -10,7 +10,7 @@ from ...arrays import Floats, Ints
 from ..dataset import Dataset
 from ..noise import robust_deviation
 from .element_errors import fit_element_errors
-from .finding import Finding, Role
+from .finding import ROLES, Finding
 
 CLOCK, DISPLACED = "clock offset", "displaced elements"
 
@@ -32,11 +32,8 @@ def find_element_errors(dataset: Dataset, residual_s: Floats) -> Iterator[Findin
         return
     errors = fit_element_errors(dataset, residual_s)
     least_s = MIN_DELAY / dataset.frequency_hz
-    roles: tuple[tuple[Role, Floats, Floats], ...] = (
-        ("emission", errors.emission_delay_s, errors.sigma_s[:, 2]),
-        ("reception", errors.reception_delay_s, errors.sigma_s[:, 3]),
-    )
-    for role, delay, sigma in roles:
+    delays = errors.emission_delay_s, errors.reception_delay_s
+    for role, delay, sigma in zip(ROLES, delays, errors.sigma_s.T[2:], strict=True):
         off = delay - np.nanmedian(delay) if np.isfinite(delay).any() else delay
         for run in _runs(_unusual(off, sigma, least_s), off):
             value = float(np.median(off[run]))

@@ -13,6 +13,7 @@ from ...arrays import Flags
 
 Action = Literal["left out", "corrected", "refused", "reported"]
 Role = Literal["emission", "reception", ""]
+ROLES: tuple[Role, ...] = ("emission", "reception")
 
 # Most pairs listed in a report; of the others it gives the number.
 MAX_LISTED = 20

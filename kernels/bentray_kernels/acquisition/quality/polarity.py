@@ -9,7 +9,7 @@ import numpy as np
 
 from ...arrays import Floats
 from ..dataset import Dataset
-from .finding import Finding, Role
+from .finding import ROLES, Finding
 
 # Periods before and after the maximum of the envelope that are compared.
 REACH = 1.0
@@ -34,11 +34,8 @@ def find_inverted(dataset: Dataset, sign: Floats) -> Iterator[Finding]:
     for _ in range(4):
         emission = _majority(sign * reception[None, :], 1)
         reception = _majority(sign * emission[:, None], 0)
-    roles: tuple[tuple[Role, Floats, object], ...] = (
-        ("emission", emission, dataset.tx),
-        ("reception", reception, dataset.rx),
-    )
-    for role, of_role, element in roles:
+    of_roles, elements = (emission, reception), (dataset.tx, dataset.rx)
+    for role, of_role, element in zip(ROLES, of_roles, elements, strict=True):
         wrong = np.flatnonzero(of_role < 0.0)
         if wrong.size:
             yield Finding(
@@ -46,7 +43,7 @@ def find_inverted(dataset: Dataset, sign: Floats) -> Iterator[Finding]:
                 f"{wrong.size} inverted in {role}",
                 "pulses as those of most elements",
                 "corrected",
-                tuple(int(k) for k in np.asarray(element)[wrong]),
+                tuple(element[wrong].tolist()),
                 role,
                 value=float(wrong.size),
                 unit="elements",

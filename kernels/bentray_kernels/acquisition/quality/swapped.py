@@ -9,7 +9,7 @@ import numpy as np
 
 from ...arrays import Floats
 from ..dataset import Dataset
-from .finding import Finding, Role
+from .finding import ROLES, Finding
 
 # An element is suspected if the deviations of its times exceed this fraction of a period and this multiple of
 # the usual deviation.
@@ -29,12 +29,8 @@ def find_swapped(dataset: Dataset, strongest_s: Floats, expected_s: Floats) -> I
         expected_s: (ntx, nrx), these times in water, for the stated positions; NaN for pairs not in water.
     """
     period = 1.0 / dataset.frequency_hz
-    roles: tuple[tuple[Role, Floats, Floats], ...] = (
-        ("reception", strongest_s, expected_s),
-        ("emission", strongest_s.T, expected_s.T),
-    )
-    for role, times, expected in roles:
-        element = dataset.rx if role == "reception" else dataset.tx
+    sides = (dataset.tx, strongest_s.T, expected_s.T), (dataset.rx, strongest_s, expected_s)
+    for role, (element, times, expected) in reversed(list(zip(ROLES, sides, strict=True))):
         for a, b, before in _exchanged(times, expected, period):
             yield Finding(
                 "swapped channels",

@@ -6,8 +6,7 @@ import math
 from dataclasses import dataclass
 
 from ...arrays import Floats
-from . import band_inversion
-from .band_inversion import Evaluation, InversionState, Model
+from .band_inversion import Evaluation, InversionState, Model, given_by
 
 
 @dataclass(frozen=True)
@@ -63,12 +62,15 @@ class BandEnd:
     curvature: Curvature | None = None
 
     @property
+    def given(self) -> int:
+        """Index of that image in the history; -1 where none was evaluated."""
+        by_held_out = self.skipped or self.image.attenuation is not None
+        return given_by(self.history, by_held_out=by_held_out) if self.history else -1
+
+    @property
     def held(self) -> float:
         """Misfit of held-out emitters in that image; NaN where none was evaluated."""
-        if not self.history:
-            return math.nan
-        by_held_out = self.skipped or self.image.attenuation is not None
-        return self.history[band_inversion.given_by(self.history, by_held_out=by_held_out)].held
+        return self.history[self.given].held if self.history else math.nan
 
 
 @dataclass(frozen=True)

@@ -6,36 +6,24 @@ import math
 from collections.abc import Sequence
 
 from ..result import Iteration
-from .band_inversion import Evaluation, given_by
-from .waveform_settings import Band, WaveSettings
+from .band_inversion import Evaluation
+from .waveform_settings import Band
 
 
 def iteration_records(
-    settings: WaveSettings,
-    number: int,
-    history: Sequence[Evaluation],
-    index: int,
-    stage: int,
-    *,
-    over: bool,
-    skipped: bool,
-    speed_residual_s: float = math.nan,
+    band: Band, history: Sequence[Evaluation], index: int, stage: int, given: int, speed_residual_s: float
 ) -> list[Iteration]:
     """A record for each image that was evaluated in a band.
 
     Args:
-        settings: of the refinement.
-        number: of the band, from 0.
+        band: the band.
         history: of the band.
         index: of the slice.
         stage: number of the band among all stages.
-        over: whether the band is finished.
-        skipped: whether the held-out misfit ended it.
+        given: index of the image that the band returned; -1 while it is not finished.
         speed_residual_s: residual of the speed, s, for a band of the attenuation.
     """
-    band = settings.bands[number]
     loss = band.of == "attenuation"
-    given = given_by(history, by_held_out=skipped or loss) if over and history else -1
     return [
         Iteration(
             index,

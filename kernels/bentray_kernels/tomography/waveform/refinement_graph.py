@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from ...arrays import Floats
 from ...task_graph import Task
 from ...wave.emissions import Engine
 from ...wave.simulation import Unknown
@@ -97,21 +96,14 @@ class RefinementGraph:
     @property
     def history(self) -> tuple[Iteration, ...]:
         """The earlier history, then one stage per band."""
-        bands = [(end.history, True, end.skipped) for end in self.ends]
+        bands = [(end.history, end.given) for end in self.ends]
         if self._band is not None:
-            bands.append((self._band.state.history, False, False))
+            bands.append((self._band.state.history, -1))
         records = list(self._earlier)
-        for number, (history, over, skipped) in enumerate(bands):
-            records += iteration_records(
-                self._scan.plan,
-                number,
-                history,
-                self._index,
-                self._stage + number,
-                over=over,
-                skipped=skipped,
-                speed_residual_s=next((r.residual_rms_s for r in reversed(records) if r.given), math.nan),
-            )
+        for number, (history, given) in enumerate(bands):
+            band, stage = self._scan.plan.bands[number], self._stage + number
+            residual = next((record.residual_rms_s for record in reversed(records) if record.given), math.nan)
+            records += iteration_records(band, history, self._index, stage, given, residual)
         return tuple(records)
 
     @property
@@ -250,14 +242,13 @@ def starting_models(image: Image, problem: WaveProblem, settings: WaveSettings) 
     speed = np.clip(resampled(image, problem.band.spacing_m, problem.origin, problem.region.shape), low, high)
     cleared = np.where(problem.region, speed, problem.water.speed)
     speeds = [speed] if np.array_equal(speed, cleared) else [speed, cleared]
-    return [Model(speed, None, _source(speed, problem, settings)) for speed in speeds]
+    window = settings.window_s
+    return [
+        Model(speed, None, estimate_source(problem, speed, window) if settings.estimates_source else None)
+        for speed in speeds
+    ]
 
 
 def held_out_misfit(problem: WaveProblem, settings: WaveSettings, model: Model) -> float:
     """Sum of the misfits of held-out emitters."""
     return band_inversion.evaluate(problem, settings, model, problem.held).held
-
-
-def _source(speed: Floats, problem: WaveProblem, settings: WaveSettings) -> Floats | None:
-    """The source estimated anew with an image, (steps,); None: that of the problem."""
-    return estimate_source(problem, speed, settings.window_s) if settings.estimates_source else None

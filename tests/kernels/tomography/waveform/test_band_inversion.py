@@ -17,6 +17,7 @@ from bentray_kernels.tomography.waveform.band_inversion import (
     given_by,
     step,
 )
+from bentray_kernels.tomography.waveform.inversion_state import BandEnd, Image
 from bentray_kernels.tomography.waveform.iterations import iteration_records, shift_s
 from bentray_kernels.tomography.waveform.preparation import prepare
 from bentray_kernels.tomography.waveform.waveform_settings import Band, WaveSettings
@@ -165,8 +166,9 @@ def test_the_image_that_a_finished_band_returned_is_marked(over, skipped, given)
     """The last accepted one, or the one that predicts the held-out emitters best."""
     misfits = ((0.9, 0.5, True), (0.8, 0.4, True), (0.7, 0.6, True), (0.75, 0.1, False))
     history = [Evaluation(*misfit) for misfit in misfits]
-    settings = WaveSettings(bands=(BAND,))
-    records = iteration_records(settings, 0, history, 3, 2, over=over, skipped=skipped)
+    image = Image(np.zeros((2, 2)), 1.0, (0.0, 0.0))
+    returned = BandEnd(image, skipped=skipped, history=tuple(history)).given if over else -1
+    records = iteration_records(BAND, history, 3, 2, returned, np.nan)
     assert [record.given for record in records] == given
     assert [record.sweep for record in records] == [1, 2, 3, 4]
     assert [record.misfit for record in records] == [0.9, 0.8, 0.7, 0.75]
