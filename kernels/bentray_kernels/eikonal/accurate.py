@@ -24,7 +24,7 @@ from .out_of_order import (
     empty_waiting,
     wait,
 )
-from .problem import PointSource, SlownessGrid
+from .problem import Factor, PointSource, SlownessGrid, Start, Strides
 from .updates import TIE, Front, factored_update
 
 # First-order times only give the order of arrival; they need not converge to rounding.
@@ -63,19 +63,10 @@ def accurate(problem: PointSource, *, supersample: int = 1) -> Floats:
     if supersample > 1:
         every = (slice(None, None, supersample),) * problem.slowness.ndim
         return np.ascontiguousarray(accurate(_supersampled(problem, int(supersample)))[every])
-    seeds, times = problem.seeds()
-    first = _first_order(problem, *(problem.surroundings(RADIUS, CONTRAST) or (seeds, times)))
-    time, complete = _pass(
-        _by_arrival(first, problem.slowness.size),
-        problem.padded_slowness,
-        problem.strides,
-        problem.spacing,
-        problem.reference_squares(),
-        4.0 * (problem.source_slowness() * problem.spacing) ** 2,
-        problem.least_factor(),
-        seeds,
-        times,
-    )
+    start = problem.start()
+    nodes, times = problem.surroundings(RADIUS, CONTRAST) or (start.seeds, start.times)
+    order = _by_arrival(_first_order(problem, nodes, times), problem.slowness.size)
+    time, complete = _pass(order, start, problem.strides, problem.factor())
     return problem.interior(time) if complete else high_accuracy_fast_marching(problem)
 
 
@@ -130,18 +121,10 @@ def _by_arrival(time: Floats, count: int) -> NDArray[np.int32]:
 
 
 @kernel
-def _pass(
-    order: NDArray[np.int32],
-    slowness: Floats,
-    strides: tuple[int, ...],
-    spacing: float,
-    squares: Floats,
-    limit: float,
-    least: float,
-    seeds: Ints,
-    seed_times: Floats,
-) -> tuple[Floats, bool]:
+def _pass(order: NDArray[np.int32], start: Start, strides: Strides, factor: Factor) -> tuple[Floats, bool]:
     """Times of all nodes, and True; False where more nodes came out of order than there are."""
+    slowness, spacing, seeds, seed_times = start
+    squares, limit, least = factor
     # A constant 0 for the third of two axes lets the compiler drop its code.
     steps = (strides[0], strides[1], strides[2] if len(strides) == 3 else 0)
     settled = np.full(slowness.size, math.inf)

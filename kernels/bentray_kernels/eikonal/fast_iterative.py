@@ -7,9 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats
 from ..compilation.compiled import int64, kernel
-from .problem import PointSource, check_tolerance
+from .problem import PointSource, Start, Strides, check_tolerance
 from .updates import first_order_2d, first_order_3d
 
 OUT = 0
@@ -34,13 +34,10 @@ def fast_iterative(problem: PointSource, *, tolerance: float = 1e-12) -> Floats:
         InvalidInput: for a negative tolerance.
     """
     check_tolerance(tolerance)
-    seeds, times = problem.seeds()
     # The border counts as listed, so that it is never added.
-    listed = problem.places(OUT, LISTED)
-    time = _iterate(
-        problem.padded_slowness, listed, problem.strides, problem.spacing, seeds, times, tolerance
+    return problem.interior(
+        _iterate(problem.start(), problem.strides, problem.places(OUT, LISTED), tolerance)
     )
-    return problem.interior(time)
 
 
 @kernel(inline="always")
@@ -56,15 +53,8 @@ def _updated(node: int, strides: tuple[int, int, int], crossing: float, time: Fl
 
 
 @kernel
-def _iterate(
-    slowness: Floats,
-    listed: NDArray[np.int32],
-    strides: tuple[int, ...],
-    spacing: float,
-    seeds: Ints,
-    seed_times: Floats,
-    tolerance: float,
-) -> Floats:
+def _iterate(start: Start, strides: Strides, listed: NDArray[np.int32], tolerance: float) -> Floats:
+    slowness, spacing, seeds, seed_times = start
     # A constant 0 for the third of two axes lets the compiler drop its code.
     steps = (strides[0], strides[1], strides[2] if len(strides) == 3 else 0)
     time = np.full(slowness.size, math.inf)

@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats
 from ..compilation.compiled import kernel
 from ..errors import InvalidInput
 from .heap import DONE, FAR, Nodes, pop_min, push_or_update
-from .problem import PointSource
+from .problem import Factor, PointSource, Start, Strides
 from .updates import TIE, Front, factored_update, plain_update
 
 
@@ -31,17 +31,7 @@ def fast_marching(problem: PointSource, *, order: int = 2) -> Floats:
     """
     if order not in (1, 2):
         raise InvalidInput("order", order, "1 or 2")
-    seeds, times = problem.seeds()
-    time = _march(
-        problem.padded_slowness,
-        problem.places(FAR, DONE),
-        problem.strides,
-        problem.spacing,
-        seeds,
-        times,
-        order == 2,
-    )
-    return problem.interior(time)
+    return problem.interior(_march(problem.start(), problem.strides, problem.places(FAR, DONE), order == 2))
 
 
 def high_accuracy_fast_marching(problem: PointSource) -> Floats:
@@ -56,31 +46,13 @@ def high_accuracy_fast_marching(problem: PointSource) -> Floats:
     Returns:
         (nx, ny[, nz]), s.
     """
-    seeds, times = problem.seeds()
-    time = _march_factored(
-        problem.padded_slowness,
-        problem.places(FAR, DONE),
-        problem.strides,
-        problem.spacing,
-        problem.reference_squares(),
-        4.0 * (problem.source_slowness() * problem.spacing) ** 2,
-        problem.least_factor(),
-        seeds,
-        times,
-    )
-    return problem.interior(time)
+    places = problem.places(FAR, DONE)
+    return problem.interior(_march_factored(problem.start(), problem.strides, places, problem.factor()))
 
 
 @kernel
-def _march(
-    slowness: Floats,
-    place: Nodes,
-    strides: tuple[int, ...],
-    spacing: float,
-    seeds: Ints,
-    seed_times: Floats,
-    second_order: bool,
-) -> Floats:
+def _march(start: Start, strides: Strides, place: Nodes, second_order: bool) -> Floats:
+    slowness, spacing, seeds, seed_times = start
     # A constant 0 for the third of two axes lets the compiler drop its code.
     steps = (strides[0], strides[1], strides[2] if len(strides) == 3 else 0)
     settled = np.full(slowness.size, math.inf)
@@ -116,17 +88,9 @@ def _march(
 
 
 @kernel
-def _march_factored(
-    slowness: Floats,
-    place: Nodes,
-    strides: tuple[int, ...],
-    spacing: float,
-    squares: Floats,
-    limit: float,
-    least: float,
-    seeds: Ints,
-    seed_times: Floats,
-) -> Floats:
+def _march_factored(start: Start, strides: Strides, place: Nodes, factor: Factor) -> Floats:
+    slowness, spacing, seeds, seed_times = start
+    squares, limit, least = factor
     # A constant 0 for the third of two axes lets the compiler drop its code.
     steps = (strides[0], strides[1], strides[2] if len(strides) == 3 else 0)
     settled = np.full(slowness.size, math.inf)

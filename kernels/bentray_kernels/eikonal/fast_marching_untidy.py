@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats
 from ..compilation.compiled import kernel
 from ..errors import InvalidInput
 from .heap import DONE, FAR, Nodes
-from .problem import PointSource
+from .problem import PointSource, Start, Strides
 from .untidy_queue import enter, take
 from .updates import TIE, plain_update
 
@@ -39,23 +39,12 @@ def fast_marching_untidy(problem: PointSource, *, order: int = 2, width: float =
     """
     if order not in (1, 2):
         raise InvalidInput("order", order, "1 or 2")
-    seeds, times = problem.seeds()
     # A little narrower, so that equal times at a bucket edge, such as half a crossing, fall on one side.
     bucket = _bucket_width(problem, width) * (1.0 - TIE)
     # At order 1 no time in the queue exceeds the current one by more than a crossing time; twice as many
     # buckets serve the seeds, which lie in one cell, and order 2.
     buckets = int(2.0 * problem.spacing * problem.slowness.max() / bucket) + 3
-    time = _march(
-        problem.padded_slowness,
-        problem.places(FAR, DONE),
-        problem.strides,
-        problem.spacing,
-        seeds,
-        times,
-        order == 2,
-        bucket,
-        buckets,
-    )
+    time = _march(problem.start(), problem.strides, problem.places(FAR, DONE), order == 2, bucket, buckets)
     return problem.interior(time)
 
 
@@ -69,16 +58,9 @@ def _bucket_width(problem: PointSource, width: float) -> float:
 
 @kernel
 def _march(
-    slowness: Floats,
-    place: Nodes,
-    strides: tuple[int, ...],
-    spacing: float,
-    seeds: Ints,
-    seed_times: Floats,
-    second_order: bool,
-    width: float,
-    buckets: int,
+    start: Start, strides: Strides, place: Nodes, second_order: bool, width: float, buckets: int
 ) -> Floats:
+    slowness, spacing, seeds, seed_times = start
     # A constant 0 for the third of two axes lets the compiler drop its code.
     steps = (strides[0], strides[1], strides[2] if len(strides) == 3 else 0)
     settled = np.full(slowness.size, math.inf)

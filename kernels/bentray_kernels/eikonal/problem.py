@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +21,28 @@ Node = tuple[int, ...]
 
 # Nodes around a source with their multilinear weights.
 Cell = list[tuple[Node, float]]
+
+
+class Start(NamedTuple):
+    """What marching begins with: a padded grid, and the nodes of the source's cell.
+
+    Attributes:
+        slowness: flat, s/m.
+        spacing: node spacing, m.
+        seeds, times: as of ``PointSource.seeds``.
+    """
+
+    slowness: Floats
+    spacing: float
+    seeds: Ints
+    times: Floats
+
+
+# Flat distance of neighbours along each axis of a padded grid.
+Strides = tuple[int, ...]
+
+# Of the time T0 in the source's own slowness: ``squares``, ``limit`` and ``least`` of ``updates.Front``.
+Factor = tuple[Floats, float, float]
 
 
 @dataclass(frozen=True)
@@ -109,7 +132,7 @@ class PointSource:
         return tuple(n + 2 for n in self.slowness.shape)
 
     @property
-    def strides(self) -> tuple[int, ...]:
+    def strides(self) -> Strides:
         """Flat distance of neighbours along each axis of the padded grid."""
         shape = self.padded_shape
         return tuple(math.prod(shape[axis + 1 :]) for axis in range(len(shape)))
@@ -125,23 +148,25 @@ class PointSource:
         inside = (slice(1, -1),) * self.slowness.ndim
         return np.ascontiguousarray(padded.reshape(self.padded_shape)[inside])
 
-    def reference_squares(self) -> Floats:
-        """T0², the squared travel time in the source's own slowness; padded and flat, s²."""
+    def factor(self) -> Factor:
+        """T0² at every node, padded and flat, s², and the numbers that limit T/T0."""
         squares: Floats = np.zeros(self.padded_shape)
         for axis, n in enumerate(self.padded_shape):
             offset = (np.arange(n) - 1.0) * self.spacing - self.source[axis]
             shape = [1] * len(self.padded_shape)
             shape[axis] = n
             squares += (offset**2).reshape(shape)
-        return np.asarray(squares * self.source_slowness() ** 2).ravel()
+        here = self.source_slowness()
+        least = self.medium.least_slowness / here
+        return np.asarray(squares * here**2).ravel(), 4.0 * (here * self.spacing) ** 2, least
 
     def source_slowness(self) -> float:
         """Slowness at the source, multilinear between its cell's nodes, s/m."""
         return float(sum(weight * self.slowness[node] for node, weight in self._cell))
 
-    def least_factor(self) -> float:
-        """The lowest slowness over that at the source: by how much T can be below T0 at most."""
-        return self.medium.least_slowness / self.source_slowness()
+    def start(self) -> Start:
+        """What compiled marching takes, beside ``strides``: their number must be known to the compiler."""
+        return Start(self.padded_slowness, self.spacing, *self.seeds())
 
     def seeds(self) -> tuple[Ints, Floats]:
         """Nodes of the source's cell: flat padded indices and travel times along straight lines, s.

@@ -96,21 +96,12 @@ def test_the_order_hardly_matters(monkeypatch, ndim, window):
 
 def solved(problem, order):
     """Padded times of a pass in an order, s, and whether it was completed."""
-    return accurate._pass(
-        order.astype(np.int32),
-        problem.padded_slowness,
-        problem.strides,
-        problem.spacing,
-        problem.reference_squares(),
-        4.0 * (problem.source_slowness() * problem.spacing) ** 2,
-        problem.least_factor(),
-        *problem.seeds(),
-    )
+    return accurate._pass(order.astype(np.int32), problem.start(), problem.strides, problem.factor())
 
 
 def recomputed(problem, times):
     """Every time computed again from the earlier ones alone; those of the source's cell as they are."""
-    squares = problem.reference_squares()
+    squares, limit, least = problem.factor()
     steps = (*problem.strides, 0)[:3]
     again = times.copy()
     seeds = set(problem.seeds()[0].tolist())
@@ -121,14 +112,7 @@ def recomputed(problem, times):
         if node not in seeds:
             settled = np.where(times < times[node] * (1.0 - 1e-12), times, np.inf)
             front = Front(
-                steps,
-                problem.spacing,
-                problem.padded_slowness,
-                squares,
-                4.0 * (problem.source_slowness() * problem.spacing) ** 2,
-                problem.least_factor(),
-                tau,
-                settled,
+                steps, problem.spacing, problem.padded_slowness, squares, limit, least, tau, settled
             )
             again[node] = factored_update(int(node), front)
     return again
