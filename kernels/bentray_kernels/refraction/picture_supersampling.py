@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats
 from ..compilation.compiled import kernel
 from .backdrop import Backdrop, Colours, paint
+from .coarse_rays import Hits
 from .texels import STEP_BITS, STEPS, WHOLE, Texels, between_texels, reduced, unpacked
 
 Planes = NDArray[np.int8]
@@ -51,25 +52,17 @@ class Texture(NamedTuple):
 
 
 @kernel
-def filter_picture(
-    backdrop: Backdrop,
-    plane: int,
-    planes: Planes,
-    places: Floats,
-    crossed: Crossed,
-    weights: Floats,
-    degree: int,
-    image: Colours,
-) -> None:
+def filter_picture(backdrop: Backdrop, plane: int, hits: Hits, degree: int, image: Colours) -> None:
     """Post-refraction supersampling of the pixels that see one interpolated picture.
 
     The samples are those of ``post_refraction_colours``, those of degree 1 at places in whole numbers.
 
     Args:
-        backdrop, planes, places, crossed, weights, degree: as for ``post_refraction_colours``.
+        backdrop, hits, degree: as for ``post_refraction_colours``.
         plane: number of the picture's plane.
         image: (rows, columns, 3); only pixels of this plane are written.
     """
+    planes, places, _, crossed, weights = hits
     rows, columns = planes.shape
     table = backdrop.tables[plane]
     texture = Texture(backdrop.texels[table[8] :], table[1], table[2], backdrop.repeats[plane])
@@ -95,7 +88,7 @@ def filter_picture(
                 colour = unpacked(_nine(texture, thirds, np.uint64(j)))
                 paint(image, i, j, colour, weights[i, j] / (9 * WHOLE))
             elif planes[i, j] == plane:
-                _sample_evenly(texture, places, i, j, state[above], state[below], degree, weights, image)
+                _sample_evenly(texture, hits, i, j, state[above], state[below], degree, image)
 
 
 @kernel(inline="always")
@@ -178,17 +171,10 @@ def _colour(texture: Texture, u: float, v: float) -> np.uint64:
 
 @kernel(inline="always")
 def _sample_evenly(
-    texture: Texture,
-    places: Floats,
-    i: int,
-    j: int,
-    above: States,
-    below: States,
-    degree: int,
-    weights: Floats,
-    image: Colours,
+    texture: Texture, hits: Hits, i: int, j: int, above: States, below: States, degree: int, image: Colours
 ) -> None:
     """Mean of (2·degree + 1)² samples; the pixel's own colour stands in for those of another piece."""
+    places = hits.where
     own = _colour(texture, places[i, j, 0], places[i, j, 1])
     step = 1.0 / (2 * degree + 1)
     red = green = blue = np.int64(0)
@@ -213,4 +199,4 @@ def _sample_evenly(
                     )
                 channels = unpacked(total)
                 red, green, blue = red + channels[0], green + channels[1], blue + channels[2]
-    paint(image, i, j, (red, green, blue), weights[i, j] * step * step / WHOLE)
+    paint(image, i, j, (red, green, blue), hits.weight[i, j] * step * step / WHOLE)

@@ -142,12 +142,11 @@ def render(
     if spacing > 1:
         hits = _of_pixels(hits, settings)
     image = np.empty((*hits.plane.shape, 3), dtype=np.uint8)
-    light = hits.weight if settings.fresnel else np.ones(hits.plane.shape)
-    grid = (backdrop, hits.plane, hits.where)
+    lit = hits if settings.fresnel else hits._replace(weight=np.ones(hits.plane.shape))
     if settings.supersampling == "prss":
-        post_refraction_colours(*grid, hits.crossed, light, settings.degree, image)
+        post_refraction_colours(backdrop, lit, settings.degree, image)
     else:
-        point_colours(*grid, light, image)
+        point_colours(backdrop, lit, image)
     # Where there is no plane, any edge leaves NaN what it is.
     position = hits.where * backdrop.edges[hits.plane]
     image = image if times == 1 else averaged(image, times)

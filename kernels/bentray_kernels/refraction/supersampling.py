@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..arrays import Flags, Floats, Ints
 from ..compilation.compiled import kernel
 from .backdrop import Backdrop, Colours, colour_at, paint
+from .coarse_rays import Hits
 from .picture_supersampling import filter_picture
 
 Planes = NDArray[np.int8]
@@ -38,41 +39,28 @@ class Pattern(NamedTuple):
 
 
 @kernel
-def point_colours(
-    backdrop: Backdrop, planes: Planes, places: Floats, weights: Floats, image: Colours
-) -> None:
+def point_colours(backdrop: Backdrop, hits: Hits, image: Colours) -> None:
     """One sample a pixel.
 
     Args:
         backdrop: what is seen.
-        planes: (rows, columns) as ``locate`` gives them.
-        places: (rows, columns, 2).
-        weights: (rows, columns) share of the light that arrives.
+        hits: (rows, columns), their weights the share of the light that arrives.
         image: (rows, columns, 3), filled.
     """
-    rows, columns = planes.shape
+    rows, columns = hits.plane.shape
     for i in range(rows):
         for j in range(columns):
-            _point(backdrop, planes, places, weights, image, i, j)
+            _point(backdrop, hits, image, i, j)
 
 
 @kernel(inline="always")
-def _point(
-    backdrop: Backdrop, planes: Planes, places: Floats, weights: Floats, image: Colours, i: int, j: int
-) -> None:
-    paint(image, i, j, colour_at(backdrop, planes[i, j], places[i, j, 0], places[i, j, 1]), weights[i, j])
+def _point(backdrop: Backdrop, hits: Hits, image: Colours, i: int, j: int) -> None:
+    colour = colour_at(backdrop, hits.plane[i, j], hits.where[i, j, 0], hits.where[i, j, 1])
+    paint(image, i, j, colour, hits.weight[i, j])
 
 
 @kernel
-def post_refraction_colours(
-    backdrop: Backdrop,
-    planes: Planes,
-    places: Floats,
-    crossed: Crossed,
-    weights: Floats,
-    degree: int,
-    image: Colours,
-) -> None:
+def post_refraction_colours(backdrop: Backdrop, hits: Hits, degree: int, image: Colours) -> None:
     """Post-refraction supersampling (PRSS): no more rays, only more samples of the backdrop.
 
     The places of a pixel and its 8 neighbours show how the object distorts the grid of pixels. Between the
@@ -84,8 +72,7 @@ def post_refraction_colours(
     pictures see ``filter_picture``.
 
     Args:
-        backdrop, planes, places, weights: as for ``point_colours``.
-        crossed: (rows, columns) interfaces met by the ray.
+        backdrop, hits: as for ``point_colours``.
         degree: at least 1.
         image: (rows, columns, 3), filled.
     """
@@ -93,38 +80,29 @@ def post_refraction_colours(
     for plane in range(len(backdrop.tables)):
         patterns |= backdrop.tables[plane, 3] == 0
     if patterns:
-        point_colours(backdrop, planes, places, weights, image)
-        _filter_patterns(backdrop, planes, places, crossed, weights, degree, image)
+        point_colours(backdrop, hits, image)
+        _filter_patterns(backdrop, hits, degree, image)
     else:
-        _colour_beyond(backdrop, planes, places, weights, image)
+        _colour_beyond(backdrop, hits, image)
     for plane in range(len(backdrop.tables)):
         if backdrop.tables[plane, 3]:
-            filter_picture(backdrop, plane, planes, places, crossed, weights, degree, image)
+            filter_picture(backdrop, plane, hits, degree, image)
 
 
 @kernel
-def _colour_beyond(
-    backdrop: Backdrop, planes: Planes, places: Floats, weights: Floats, image: Colours
-) -> None:
+def _colour_beyond(backdrop: Backdrop, hits: Hits, image: Colours) -> None:
     """Colours of the pixels that see no plane."""
-    rows, columns = planes.shape
+    rows, columns = hits.plane.shape
     for i in range(rows):
         for j in range(columns):
-            if planes[i, j] < 0:
-                _point(backdrop, planes, places, weights, image, i, j)
+            if hits.plane[i, j] < 0:
+                _point(backdrop, hits, image, i, j)
 
 
 @kernel
-def _filter_patterns(
-    backdrop: Backdrop,
-    planes: Planes,
-    places: Floats,
-    crossed: Crossed,
-    weights: Floats,
-    degree: int,
-    image: Colours,
-) -> None:
+def _filter_patterns(backdrop: Backdrop, hits: Hits, degree: int, image: Colours) -> None:
     """Supersampling of the pixels that see a pattern of squares."""
+    planes, places, _, crossed, weights = hits
     rows, columns = planes.shape
     # Of two rows, in turn.
     pieces, squares = np.empty((2, columns), dtype=np.int32), np.empty((2, columns), dtype=np.int64)
@@ -167,7 +145,7 @@ def _filter_patterns(
             if degree == 1 and joined & same_piece[after, j] & same_piece[after, j + 1]:
                 colour = _nine(backdrop, planes[i, j], thirds, np.uint64(j))
             else:
-                colour = _sample_evenly(backdrop, planes, places, i, j, same_square, same_piece, degree)
+                colour = _sample_evenly(backdrop, hits, i, j, same_square, same_piece, degree)
             paint(image, i, j, colour, share * weights[i, j])
 
 
@@ -213,17 +191,11 @@ def _square(pattern: Pattern, x: int, y: int) -> np.uint64:
 
 @kernel(inline="always")
 def _sample_evenly(
-    backdrop: Backdrop,
-    planes: Planes,
-    places: Floats,
-    i: int,
-    j: int,
-    same_square: Flags,
-    same_piece: Flags,
-    degree: int,
+    backdrop: Backdrop, hits: Hits, i: int, j: int, same_square: Flags, same_piece: Flags, degree: int
 ) -> tuple[float, float, float]:
     """Sum of (2·degree + 1)² samples; the pixel's own colour stands in for those of another piece."""
-    own = colour_at(backdrop, planes[i, j], places[i, j, 0], places[i, j, 1])
+    plane, places = hits.plane[i, j], hits.where
+    own = colour_at(backdrop, plane, places[i, j, 0], places[i, j, 1])
     red = green = blue = 0.0
     for down in range(2):
         for right in range(2):
@@ -236,7 +208,7 @@ def _sample_evenly(
                     if other and a + b > 0:
                         p, q = i - 1 + 2 * down, j - 1 + 2 * right
                         u, v = _between(places, i, j, p, q, a / (2 * degree + 1), b / (2 * degree + 1))
-                        colour = colour_at(backdrop, planes[i, j], u, v)
+                        colour = colour_at(backdrop, plane, u, v)
                     red += colour[0]
                     green += colour[1]
                     blue += colour[2]

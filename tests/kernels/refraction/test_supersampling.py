@@ -5,6 +5,7 @@ import pytest
 
 from bentray_kernels.refraction import backdrop_of, checkerboard
 from bentray_kernels.refraction.backdrop import Backdrop, Plane
+from bentray_kernels.refraction.coarse_rays import Hits
 from bentray_kernels.refraction.supersampling import averaged, point_colours, post_refraction_colours
 
 BOARD = backdrop_of([checkerboard((0, 0, 1), (8, 0, 0), (0, 8, 0), 8, ((200,) * 3, (0,) * 3))])
@@ -17,16 +18,20 @@ def regular(n: int, across: float, shift: float = 0.0) -> tuple[np.ndarray, ...]
     return np.zeros((n, n), dtype=np.int8), positions, np.zeros((n, n), dtype=np.int16)
 
 
+def hits(planes, positions, crossed, weights) -> Hits:
+    light = np.ones(planes.shape) if weights is None else weights
+    return Hits(planes, positions, np.zeros(planes.shape, np.uint8), crossed, light)
+
+
 def post(backdrop: Backdrop, planes, positions, crossed, degree=1, weights=None) -> np.ndarray:
     image = np.empty((*planes.shape, 3), dtype=np.uint8)
-    light = np.ones(planes.shape) if weights is None else weights
-    post_refraction_colours(backdrop, planes, positions, crossed, light, degree, image)
+    post_refraction_colours(backdrop, hits(planes, positions, crossed, weights), degree, image)
     return image
 
 
 def points(backdrop: Backdrop, planes, positions, weights=None) -> np.ndarray:
     image = np.empty((*planes.shape, 3), dtype=np.uint8)
-    point_colours(backdrop, planes, positions, np.ones(planes.shape) if weights is None else weights, image)
+    point_colours(backdrop, hits(planes, positions, np.zeros(planes.shape, np.int16), weights), image)
     return image
 
 
