@@ -134,9 +134,9 @@ def backward(
     scale = float(np.abs(residual).max())
     taps, sources = weights(medium.order).astype(kind), (residual / (scale or 1.0)).astype(kind)
     spans = everywhere(medium) if spans is None else spans
-    arguments = (fields[0], fields[1], medium.factors, taps, detectors, sources, spans, medium.margin, every)
+    shot = (*fields, medium.factors, taps, detectors, sources)
     for begin, end in split_steps(residual.shape[1], medium.keep.size, poll):
-        _backward(begin, end, *arguments, scattered, image, light)
+        _backward(begin, end, shot, spans, medium.margin, every, scattered, image, light)
     return scale * image.astype(np.float64), LIGHT_EVERY * light.astype(np.float64)
 
 
@@ -144,12 +144,7 @@ def backward(
 def _backward(
     begin: int,
     end: int,
-    now: Any,
-    old: Any,
-    factors: Any,
-    weights: Any,
-    receivers: Any,
-    residual: Any,
+    shot: Any,
     spans: Any,
     margin: int,
     every: int,
@@ -157,10 +152,10 @@ def _backward(
     image: Any,
     light: Any,
 ) -> None:
+    now, old, (keep, fade, drive), weights, receivers, residual = shot
     # At the start of iteration n, ``now`` is the adjoint field of equation n. The scheme is symmetric except
     # for the direction of time, so the same step advances the adjoint field backwards.
     use_widest_vectors()
-    keep, fade, drive = factors
     nx, ny = image.shape
     last = residual.shape[1] - 1
     for n in range(last - begin, last - end, -1):

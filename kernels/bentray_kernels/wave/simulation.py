@@ -155,11 +155,11 @@ def forward(
     fields = [zeros(medium.keep.shape, kind) for _ in range(2)]
     scale = float(np.abs(wavelet).max())
     taps, pulse = weights(medium.order).astype(kind), (wavelet / scale).astype(kind)
-    arguments = (fields[0], fields[1], medium.factors, taps, source, detectors, pulse, traces)
+    shot = (*fields, medium.factors, taps, source, detectors, pulse, traces)
     blocks = split_steps(nt, medium.keep.size, poll)
     if medium.speed.ndim == 3:
         for begin, end in blocks:
-            _forward_3d(begin, end, *arguments)
+            _forward_3d(begin, end, shot)
         # A point source is 1 / spacing^3 on its node; the factors contain spacing^2.
         traces *= kind.type(scale / medium.spacing)
         return traces, np.empty((0, *medium.speed.shape), kind)
@@ -169,7 +169,7 @@ def forward(
     turn = (1 - fade) / (1 + fade)
     spans = everywhere(medium) if spans is None else spans
     for begin, end in blocks:
-        _forward(begin, end, *arguments, spans, medium.margin, every, by == "attenuation", turn, scattered)
+        _forward(begin, end, shot, spans, medium.margin, every, by == "attenuation", turn, scattered)
     traces *= kind.type(scale)
     return traces, scattered
 
@@ -183,14 +183,7 @@ def fields_of(medium: Medium, nt: int, every: int) -> tuple[tuple[int, ...], np.
 def _forward(
     begin: int,
     end: int,
-    now: Any,
-    old: Any,
-    factors: Any,
-    weights: Any,
-    source: Any,
-    detectors: Any,
-    wavelet: Any,
-    traces: Any,
+    shot: Any,
     spans: Any,
     margin: int,
     every: int,
@@ -198,7 +191,7 @@ def _forward(
     turn: Any,
     scattered: Any,
 ) -> None:
-    keep, fade, drive = factors
+    now, old, (keep, fade, drive), weights, source, detectors, wavelet, traces = shot
     first, along = source.first[0], source.weights[0]
     scratch = np.empty(now.shape[1], now.dtype)
     for n in range(begin, end):
@@ -221,19 +214,8 @@ def _forward(
 
 
 @kernel
-def _forward_3d(
-    begin: int,
-    end: int,
-    now: Any,
-    old: Any,
-    factors: Any,
-    weights: Any,
-    source: Any,
-    detectors: Any,
-    wavelet: Any,
-    traces: Any,
-) -> None:
-    keep, fade, drive = factors
+def _forward_3d(begin: int, end: int, shot: Any) -> None:
+    now, old, (keep, fade, drive), weights, source, detectors, wavelet, traces = shot
     for n in range(begin, end):
         for r in range(traces.shape[0]):
             traces[r, n] = read_3d(now, detectors.first[r], detectors.weights[r])
