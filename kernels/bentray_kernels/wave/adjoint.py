@@ -136,23 +136,14 @@ def backward(
     spans = everywhere(medium) if spans is None else spans
     shot = (*fields, medium.factors, taps, detectors, sources)
     for begin, end in split_steps(residual.shape[1], medium.keep.size, poll):
-        _backward(begin, end, shot, spans, medium.margin, every, scattered, image, light)
+        _backward(begin, end, shot, spans, medium.margin, every, (scattered, image, light))
     return scale * image.astype(np.float64), LIGHT_EVERY * light.astype(np.float64)
 
 
 @kernel
-def _backward(
-    begin: int,
-    end: int,
-    shot: Any,
-    spans: Any,
-    margin: int,
-    every: int,
-    scattered: Any,
-    image: Any,
-    light: Any,
-) -> None:
+def _backward(begin: int, end: int, shot: Any, spans: Any, margin: int, every: int, images: Any) -> None:
     now, old, (keep, fade, drive), weights, receivers, residual = shot
+    scattered, image, light = images
     # At the start of iteration n, ``now`` is the adjoint field of equation n. The scheme is symmetric except
     # for the direction of time, so the same step advances the adjoint field backwards.
     use_widest_vectors()

@@ -168,8 +168,9 @@ def forward(
     fade = medium.fade[inner]
     turn = (1 - fade) / (1 + fade)
     spans = everywhere(medium) if spans is None else spans
+    storing = every, by == "attenuation", turn, scattered
     for begin, end in blocks:
-        _forward(begin, end, shot, spans, medium.margin, every, by == "attenuation", turn, scattered)
+        _forward(begin, end, shot, spans, medium.margin, storing)
     traces *= kind.type(scale)
     return traces, scattered
 
@@ -180,18 +181,9 @@ def fields_of(medium: Medium, nt: int, every: int) -> tuple[tuple[int, ...], np.
 
 
 @kernel
-def _forward(
-    begin: int,
-    end: int,
-    shot: Any,
-    spans: Any,
-    margin: int,
-    every: int,
-    by_loss: bool,
-    turn: Any,
-    scattered: Any,
-) -> None:
+def _forward(begin: int, end: int, shot: Any, spans: Any, margin: int, storing: Any) -> None:
     now, old, (keep, fade, drive), weights, source, detectors, wavelet, traces = shot
+    every, by_loss, turn, scattered = storing
     first, along = source.first[0], source.weights[0]
     scratch = np.empty(now.shape[1], now.dtype)
     for n in range(begin, end):

@@ -13,7 +13,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.rays import trace
 from bentray_kernels.splines.prefilter import prefilter
 from bentray_kernels.tomography import rmse
-from bentray_kernels.wave import Medium
+from bentray_kernels.wave.medium import Medium
 
 from ..straight_scans import ring_scan
 from .test_arrangement import on_ring, scan
