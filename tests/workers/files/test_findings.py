@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
 from bentray_kernels.acquisition.quality import Finding
-from bentray_workers.files.findings import ScanFindings, read_findings, write_findings
+from bentray_workers.files.picking_files import ScanFindings, read_findings, write_findings
 
 findings = st.builds(
     Finding,

@@ -8,7 +8,7 @@ from bentray_kernels.tomography.waveform.wave_scan import WaveScan
 from bentray_kernels.wave import time_blocks
 from bentray_workers.cluster.job_cancellation import JobEnded
 from bentray_workers.files.dataset import write_dataset
-from bentray_workers.files.findings import ScanFindings, write_findings
+from bentray_workers.files.picking_files import ScanFindings, write_findings
 from bentray_workers.reconstruction.file_scan import FileSource
 
 from ...kernels.tomography.waveform.scans import SETTINGS, scan

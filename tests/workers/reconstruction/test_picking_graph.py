@@ -15,7 +15,7 @@ from bentray_kernels.tomography import reconstruct as reconstruct_here
 from bentray_kernels.tomography.waveform.wave_scan import WaveScan
 from bentray_workers.cluster.job_cancellation import JobEnded
 from bentray_workers.files.dataset import read_dataset, write_dataset
-from bentray_workers.files.findings import read_findings
+from bentray_workers.files.picking_files import read_findings
 from bentray_workers.reconstruction import reconstruction_run
 from bentray_workers.reconstruction.memory import picking_memory
 from bentray_workers.reconstruction.picking_graph import (

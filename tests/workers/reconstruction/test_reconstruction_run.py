@@ -17,7 +17,7 @@ from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography import reconstruct as reconstruct_here
 from bentray_workers.cluster.fair_shares import Shares
 from bentray_workers.files.dataset import write_dataset
-from bentray_workers.files.findings import ScanFindings
+from bentray_workers.files.picking_files import ScanFindings
 from bentray_workers.reconstruction import picking_graph, reconstruction_run
 
 from ...waiting import wait_until

@@ -15,7 +15,7 @@ from bentray_kernels.tomography.comparison import compare
 from bentray_kernels.tomography.waveform.inversion_state import Image
 from bentray_workers.cluster.connection import open_cluster
 from bentray_workers.files.dataset import write_dataset
-from bentray_workers.files.reference import reference_path
+from bentray_workers.files.picking_files import reference_path
 from bentray_workers.reconstruction import reconstruction_run
 from bentray_workers.simulation.simulation_run import simulate
 from bentray_workers.simulation.waves import WaveSimulationSettings

@@ -15,8 +15,7 @@ from bentray_kernels.tomography.waveform.wave_scan import wave_problem_of
 
 from ..cluster.job_cancellation import check_job_active
 from ..files.dataset.scan import ScanHeader, open_slice, read_header
-from ..files.findings import read_findings
-from ..files.reference import reference_path, with_reference
+from ..files.picking_files import read_findings, reference_path, with_reference
 from .memory.ray_memory import PROBLEMS_KEPT
 
 # How many values of each kind a process keeps. Two jobs may alternate; more problems of waves would cost

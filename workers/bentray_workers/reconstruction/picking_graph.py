@@ -42,8 +42,13 @@ from bentray_kernels.tomography import Progress
 from ..cluster.job_cancellation import check_job_active
 from ..files.dataset.scan import ScanHeader, open_slice
 from ..files.dataset.write import write_dataset
-from ..files.findings import ScanFindings, write_findings
-from ..files.reference import reference_path, with_reference, write_reference
+from ..files.picking_files import (
+    ScanFindings,
+    reference_path,
+    with_reference,
+    write_findings,
+    write_reference,
+)
 from .file_scan import read_once
 from .memory.picking_memory import parts_of
 

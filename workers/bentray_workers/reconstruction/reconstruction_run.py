@@ -29,8 +29,7 @@ from ..cluster.job_progress import job_progress
 from ..cluster.task_pool import open_pool
 from ..files.dataset.read import check_readable
 from ..files.dataset.scan import ScanHeader
-from ..files.findings import ScanFindings, read_findings
-from ..files.reference import read_reference, reference_path
+from ..files.picking_files import ScanFindings, read_findings, read_reference, reference_path
 from ..files.volume_export import FREQUENCY
 from .blocks.block_files import BLOCKS
 from .blocks.block_graph import BlockSartGraph
