@@ -8,8 +8,7 @@ from dataclasses import fields
 from bentray_kernels.requests.ranges import RANGE
 from bentray_kernels.requests.request_fields import choices_of, effective_when
 from bentray_kernels.tomography.settings import PLACES, Settings
-from bentray_service.cli.options.option_tables import default_of
-from bentray_service.cli.options.settings_options import OPTIONS
+from bentray_service.cli.options.option_tables import SETTINGS_OPTIONS, default_of
 
 from .tables import table
 
@@ -32,4 +31,4 @@ def _rows() -> Iterator[tuple[str, str, str, str, str]]:
         if place in effective:
             meaning += f" Has an effect if {effective[place]}."
         default = default_of(field) if field.default is None else f"`{default_of(field)}`"
-        yield f"`{place}`", default, accepted, f"`{OPTIONS[name].name}`", meaning
+        yield f"`{place}`", default, accepted, f"`{SETTINGS_OPTIONS[name].name}`", meaning

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from .options.option_tables import settings_from, with_settings_options
 from .options.paths import input_file, output_folder
 from .options.scan_options import checked_dataset, dataset_file, input_scan, metadata_of, with_scan_options
-from .options.settings_options import settings_from, with_settings_options
 from .output.exit_codes import AcceptDoubtful, WorkFailed, end_doubtful
 from .output.results import show_results, write_results
 from .output.terminal import AsJson, print_json, print_lines, print_table, progress_bar, progress_shown

@@ -10,9 +10,9 @@ import typer
 
 from bentray_kernels.errors import InvalidInput
 
+from .options.option_tables import settings_from, with_settings_options
 from .options.paths import output_folder
 from .options.scan_options import checked_dataset, dataset_file, input_scan, metadata_of, with_scan_options
-from .options.settings_options import settings_from, with_settings_options
 from .output.batch_view import report
 from .output.exit_codes import AcceptDoubtful, client_errors, end_doubtful
 from .output.results import show_results, write_results

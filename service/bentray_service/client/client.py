@@ -79,6 +79,12 @@ def _document(method: Callable[..., Any], flow: Callable[..., Any]) -> None:
 class Operations(Connection):
     """Operations of both clients; ``_run`` executes the flow of an operation."""
 
+    _http: Any
+    _bucket: Any
+
+    def _connection_of(self, path: str) -> Any:
+        return self._http if path.startswith("/") else self._bucket
+
     upload = _Operation(flows.upload)
     correct_dataset = _Operation(flows.correct_dataset)
     submit = _Operation(flows.submit)
@@ -175,13 +181,10 @@ class Client(Operations):
             del listening[step.path]
         return line
 
-    def _of(self, path: str) -> httpx.Client:
-        return self._http if path.startswith("/") else self._bucket
-
     @contextmanager
     def _respond(self, method: str, path: str, **request: Any) -> Iterator[httpx.Response]:
         try:
-            with self._of(path).stream(method, path, **request) as response:
+            with self._connection_of(path).stream(method, path, **request) as response:
                 if not response.is_success:
                     response.read()
                     raise from_response(response)
@@ -255,13 +258,10 @@ class AsyncClient(Operations):
             del listening[step.path]
         return line
 
-    def _of(self, path: str) -> httpx.AsyncClient:
-        return self._http if path.startswith("/") else self._bucket
-
     @asynccontextmanager
     async def _respond(self, method: str, path: str, **request: Any) -> AsyncIterator[httpx.Response]:
         try:
-            async with self._of(path).stream(method, path, **request) as response:
+            async with self._connection_of(path).stream(method, path, **request) as response:
                 if not response.is_success:
                     await response.aread()
                     raise from_response(response)

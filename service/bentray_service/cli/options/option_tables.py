@@ -12,6 +12,8 @@ import typer
 
 from bentray_kernels.requests.ranges import RANGE
 from bentray_kernels.requests.request_fields import choices_of
+from bentray_kernels.tomography.settings import PLACES, Settings
+from bentray_kernels.tomography.stored_settings import WITHDRAWN
 
 Command = Callable[..., None]
 
@@ -135,3 +137,45 @@ def default_of(field: Field[Any]) -> str:
     if isinstance(field.default, bool):
         return "yes" if field.default else "no"
     return " ".join(map(str, field.default)) if isinstance(field.default, tuple) else str(field.default)
+
+
+def _options() -> dict[str, Option]:
+    options = {}
+    for name, place in PLACES.items():
+        record, _, leaf = place.rpartition(".")
+        kind: Any = type(getattr(Settings(), record)) if record else Settings
+        options[name] = options_of(kind, {leaf: name})[leaf]
+    return options
+
+
+def _withdrawn() -> dict[str, Option]:
+    """Options of earlier versions, hidden: each ends in the line that says what replaced it."""
+    switches = ("focusing", "coherence_factor")
+    flags = {name: flag_of(name) for name in WITHDRAWN}
+    return {
+        name: Option(f"{flag}/--no-{flag[2:]}", bool, "", "", hidden=True)
+        if name in switches
+        else Option(flag, str, "", "", hidden=True)
+        for name, flag in flags.items()
+    }
+
+
+# By the names of ``PLACES``, in the order of the help.
+SETTINGS_OPTIONS = _options()
+
+# The command with one CLI option per setting in place of its parameter ``options``.
+with_settings_options = with_options({**SETTINGS_OPTIONS, **_withdrawn()})
+
+
+def settings_from(options: dict[str, Any]) -> Settings:
+    """The settings of a command line; an option that is not given takes its default.
+
+    Args:
+        options: values of the options that were given, by the names of ``PLACES``.
+
+    Raises:
+        InvalidInput: naming the setting, its value and what is accepted.
+    """
+    from ...settings_request import nested, record_of
+
+    return record_of(Settings, nested(options))

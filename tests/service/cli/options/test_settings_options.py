@@ -8,7 +8,7 @@ import typer
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography.settings import PLACES, Settings
 from bentray_service.cli import app
-from bentray_service.cli.options.settings_options import OPTIONS, settings_from
+from bentray_service.cli.options.option_tables import SETTINGS_OPTIONS, settings_from
 
 from ..conftest import Run
 
@@ -77,7 +77,7 @@ def test_several_are_taken_together(bentray: Run, received: list[Settings], tmp_
 
 
 def test_every_setting_has_its_option() -> None:
-    assert list(OPTIONS) == list(PLACES) == [name for _, name, _ in CHOICES]
+    assert list(SETTINGS_OPTIONS) == list(PLACES) == [name for _, name, _ in CHOICES]
 
 
 def test_no_options_give_default_settings() -> None:
@@ -87,7 +87,7 @@ def test_no_options_give_default_settings() -> None:
 @pytest.mark.parametrize("command", ["reconstruct", "submit"])
 def test_the_help_states_the_defaults_that_the_settings_have(command: str) -> None:
     parameters = {parameter.name: parameter for parameter in COMMANDS[command].params}
-    for name, option in OPTIONS.items():
+    for name, option in SETTINGS_OPTIONS.items():
         assert [*parameters[name].opts, *parameters[name].secondary_opts] == option.name.split("/")
         assert parameters[name].default is None, "a default of its own would hide that of the settings"
         record, _, leaf = PLACES[name].rpartition(".")
@@ -101,4 +101,4 @@ def test_the_help_states_the_defaults_that_the_settings_have(command: str) -> No
 
 
 def test_the_unit_of_a_range_keeps_its_letters() -> None:
-    assert "A number from 0 to 95 °C." in OPTIONS["water_temperature_c"].help
+    assert "A number from 0 to 95 °C." in SETTINGS_OPTIONS["water_temperature_c"].help
