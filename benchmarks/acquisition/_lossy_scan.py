@@ -38,8 +38,8 @@ def lossy_scan(settings: WaveSimulationSettings, progress: Step, *, proportional
     phantom, nodes = table6(settings.coupling_mps), settings.fine_nodes
     ratio = settings.frequency_hz / TABLE6_HZ
     speed, loss = phantom.speed(nodes, TABLE6_SIDE_M), ratio * phantom.attenuation(nodes, TABLE6_SIDE_M)
-    grid = settings.spacing_m, settings.step_s
-    water = Medium.from_speed(np.full_like(speed, settings.coupling_mps), *grid, edge_nodes=EDGE_NODES)
+    grid, made = (settings.spacing_m, settings.step_s), {"edge_nodes": EDGE_NODES, "order": ORDER}
+    water = Medium.from_speed(np.full_like(speed, settings.coupling_mps), *grid, **made)
     tissue: Medium | Absorbing
     if proportional:
         centre = settings.frequency_hz
@@ -47,7 +47,7 @@ def lossy_scan(settings: WaveSimulationSettings, progress: Step, *, proportional
             speed, *grid, attenuation=loss, frequency_hz=centre, edge_nodes=EDGE_NODES
         )
     else:
-        tissue = Medium.from_speed(speed, *grid, attenuation=loss, edge_nodes=EDGE_NODES)
+        tissue = Medium.from_speed(speed, *grid, attenuation=loss, **made)
     positions = settings.elements_m() + 0.5 * settings.side_m
     late = settings.step_s * settings.frequency_hz * np.arange(settings.samples * settings.skip) - BEFORE
     pulse = np.exp(-((0.9 * late) ** 2)) * np.sin(2.0 * np.pi * late)
@@ -56,8 +56,11 @@ def lossy_scan(settings: WaveSimulationSettings, progress: Step, *, proportional
     def emission(k: int) -> None:
         emitter = positions[settings.senders()[k]]
         for of_medium, medium in zip(traces, (tissue, water), strict=True):
-            through = simulate_absorbed if isinstance(medium, Absorbing) else simulate
-            of_medium[k] = through(medium, emitter, positions, pulse, ORDER)[:, :: settings.skip]
+            if isinstance(medium, Absorbing):
+                recorded = simulate_absorbed(medium, emitter, positions, pulse, ORDER)
+            else:
+                recorded = simulate(medium, emitter, positions, pulse)
+            of_medium[k] = recorded[:, :: settings.skip]
 
     # The simulators release the GIL.
     with ThreadPoolExecutor(os.cpu_count()) as pool:

@@ -78,20 +78,18 @@ class Machine:
                 running.remove(future)
                 future.result()
         seconds = time.perf_counter() - begun
-        scheduler, driver = (now - then for now, then in zip(self._spent(), before, strict=True))
-        return Run(workers, length, tasks, seconds, scheduler, driver)
+        return Run(workers, length, tasks, seconds, *self._spent(before))
 
     def idle(self, seconds: float) -> Run:
         """Cost of the heartbeats of idle workers."""
         time.sleep(SETTLE_S)
         before = self._spent()
         time.sleep(seconds)
-        scheduler, driver = (now - then for now, then in zip(self._spent(), before, strict=True))
-        return Run(self._cluster.describe()["workers"], 0.0, 0, seconds, scheduler, driver)
+        return Run(self._cluster.describe()["workers"], 0.0, 0, seconds, *self._spent(before))
 
-    def _spent(self) -> tuple[float, float]:
+    def _spent(self, before: tuple[float, float] = (0.0, 0.0)) -> tuple[float, float]:
         times = self._scheduler.cpu_times()
-        return times.user + times.system, time.process_time()
+        return times.user + times.system - before[0], time.process_time() - before[1]
 
 
 @contextmanager

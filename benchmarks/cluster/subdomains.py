@@ -2,7 +2,7 @@
 
 import os
 import tempfile
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -37,10 +37,10 @@ SPACING_M = 1e-3
 def rows(context: BenchmarkContext) -> Iterable[Row]:
     """One projection, and a volume, in blocks on workers of this machine; ``quick`` takes two processes."""
     with tempfile.TemporaryDirectory() as name:
-        yield from blocks(Path(name), context.quick, context.progress)
+        yield from measured(Path(name), context.quick, context.progress)
 
 
-def blocks(folder: Path, quick: bool, progress: Step) -> Iterable[Row]:
+def measured(folder: Path, quick: bool, progress: Step) -> Iterable[Row]:
     """Rows by number of processes, each with its own cluster on this machine."""
     cores = len(os.sched_getaffinity(0))
     sides = (128,) if quick else (128, 256)
@@ -61,7 +61,8 @@ def blocks(folder: Path, quick: bool, progress: Step) -> Iterable[Row]:
             for side, (speed, spacing) in fields.items():
                 progress(count, 8, f"{side}² in blocks on {count} processes")
                 source = (0.1 * TABLE6_SIDE_M, 0.5 * TABLE6_SIDE_M)
-                run = in_blocks(cluster, speed, spacing, source, (along_x, along_y))
+                blocks = along_x, along_y
+                run = partial(solve_in_blocks, cluster.client, speed, spacing, source, blocks)
                 least_s = least(run, RUNS)
                 single = least(partial(eikonal.solve, speed, spacing, source, "fsm"), RUNS)
                 detail = (
@@ -150,9 +151,3 @@ def in_space(cluster: Cluster, file: Path, sources: Floats, count: int, alone: f
         f"{len(sources)} sources, {blocks[0]} by {blocks[1]} by 1 blocks {seconds:.2f} s; "
         f"one process without blocks {alone:.2f} s{more}",
     )
-
-
-def in_blocks(cluster: Cluster, *arguments: Any) -> Callable[[], object]:
-    """A solve whose blocks stay on their workers."""
-
-    return partial(solve_in_blocks, cluster.client, *arguments)

@@ -45,21 +45,13 @@ COLUMNS = (
 )
 
 
-@dataclass(frozen=True)
-class Figures:
-    """Our seconds of a projection: alone, and as one of many where the method takes many together."""
-
-    alone: float
-    of_many: float | None
-
-
 def rows(context: BenchmarkContext) -> Iterable[Row]:
     """A row a cell and a way to solve; ``quick`` covers 128²."""
     sides = SIDES[:1] if context.quick else SIDES
     names = tuple(dict.fromkeys(column.ours for column in COLUMNS))
     device, refusal = opencl()
     for i, nodes in enumerate(sides):
-        figures_of: dict[str, Figures] = {}
+        figures_of: dict[str, dict[str, float]] = {}
         for k, name in enumerate(names):
             context.progress(i * len(names) + k, len(sides) * len(names), f"{name} {nodes}²")
             if device or not eikonal.METHODS[name].on_device:
@@ -70,7 +62,9 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
     context.progress(len(sides) * len(names), len(sides) * len(names), "done")
 
 
-def beside(column: Column, nodes: int, figures: Figures | None, ran_on: str, refusal: str) -> Iterable[Row]:
+def beside(
+    column: Column, nodes: int, figures: dict[str, float] | None, ran_on: str, refusal: str
+) -> Iterable[Row]:
     """Our figures beside one cell of the table."""
     goal = column.seconds[nodes]
     theirs = f"theirs {goal * 1e3:g} ms on {column.hardware}, 2008"
@@ -78,25 +72,26 @@ def beside(column: Column, nodes: int, figures: Figures | None, ran_on: str, ref
     if figures is None:
         yield Row(label, None, goal, "<=", "s", f"no OpenCL device: {refusal}; {theirs}")
         return
-    ways = {"single": figures.alone, f"of {SOURCES}": figures.of_many}
-    for way, seconds in ways.items():
-        if seconds is not None:
-            times = f"{goal / seconds:.3g} times as fast"
-            how = f"{column.ours} {seconds * 1e3:.3g} ms on {ran_on}, {times}; {theirs}"
-            yield Row(f"{label}, {way}", seconds, goal, "<=", "s", how)
+    for way, seconds in figures.items():
+        times = f"{goal / seconds:.3g} times as fast"
+        how = f"{column.ours} {seconds * 1e3:.3g} ms on {ran_on}, {times}; {theirs}"
+        yield Row(f"{label}, {way}", seconds, goal, "<=", "s", how)
 
 
-def measured(name: str, nodes: int) -> Figures:
-    """Projections through the breast of Table 6 in water of 1500 m/s, emitters on a ring."""
+def measured(name: str, nodes: int) -> dict[str, float]:
+    """Seconds of a projection through the breast of Table 6 in water of 1500 m/s, emitters on a ring.
+
+    Alone, and as one of many where the method takes many together.
+    """
     speed = table6(1500.0).speed(nodes, TABLE6_SIDE_M)
     spacing = TABLE6_SIDE_M / (nodes - 1)
     angle = 2.0 * np.pi * np.arange(SOURCES) / SOURCES
     ring = TABLE6_SIDE_M * (0.5 + 0.475 * np.column_stack((np.cos(angle), np.sin(angle))))
-    alone = least_seconds(lambda: eikonal.solve(speed, spacing, ring[0], name))
-    if not eikonal.METHODS[name].batched:
-        return Figures(alone, None)
-    together = least_seconds(lambda: eikonal.solve_many(speed[None], spacing, ring, name))
-    return Figures(alone, together / SOURCES)
+    figures = {"single": least_seconds(lambda: eikonal.solve(speed, spacing, ring[0], name))}
+    if eikonal.METHODS[name].batched:
+        together = least_seconds(lambda: eikonal.solve_many(speed[None], spacing, ring, name))
+        figures[f"of {SOURCES}"] = together / SOURCES
+    return figures
 
 
 def opencl() -> tuple[str, str]:

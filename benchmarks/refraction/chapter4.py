@@ -10,7 +10,6 @@ import numpy as np
 
 from bentray_kernels.refraction import (
     Backdrop,
-    Plane,
     Scene,
     backdrop_of,
     checkerboard,
@@ -173,9 +172,6 @@ def backdrops() -> dict[str, Backdrop]:
     red = checkerboard((0.0, 0.0, 2.0), (4.0, 0.0, 0.0), (0.0, -4.0, 0.0), 12, colours)
     near = checkerboard((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, -2.0, 0.0), 16)
     far = checkerboard((0.0, 0.0, 4.0), (8.0, 0.0, 0.0), (0.0, -8.0, 0.0), 24, colours)
-    return {"coarser": backdrop_of([red]), "a strip before a plane": backdrop_of([alone(near), far])}
-
-
-def alone(plane: Plane) -> Plane:
-    """The rectangle alone, without what goes on beyond it."""
-    return replace(plane, endless=False)
+    # The rectangle alone, without what goes on beyond it.
+    strip = replace(near, endless=False)
+    return {"coarser": backdrop_of([red]), "a strip before a plane": backdrop_of([strip, far])}

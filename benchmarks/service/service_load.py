@@ -104,7 +104,7 @@ def beside_work(url: str, folder: Path, seconds: float, quick: bool) -> Iterator
     with Client(url) as client:
         small = client.upload(made_up_scan(folder / "small.h5", elements, 1)).id
         done = client.wait(client.submit(small, {"nodes": nodes, "iterations": 1}).id)
-        picture = f"/v1/volumes/{done['volume']}/slice.png"
+        picture = f"/v1/volumes/{done.volume}/slice.png"
         several = client.upload(made_up_scan(folder / "several.h5", elements, slices)).id
         job = client.submit(several, {"nodes": nodes, "iterations": 1000, "method": "sart"}).id
         content = made_up_scan(folder / "sent.h5", 64, 1).read_bytes()

@@ -1,6 +1,7 @@
 """Goals V1 and V7: splines against other packages, and the gradient angles of Li 2008, chapter 3."""
 
 from collections.abc import Callable, Iterable
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -14,7 +15,7 @@ from ._filters_picture import picture
 from ._gradient_angles import BALL_NODES, RINGS_NODES, RINGS_RADIUS, ball, rings
 from ._spline_peers import installed
 
-REPEATS = 15
+REPEATS, FEW_REPEATS = 15, 5
 
 # Nodes along each axis of the volume that is read.
 NODES = 64
@@ -41,37 +42,29 @@ def speed(quick: bool) -> Iterable[Row]:
         volume = np.random.default_rng(0).uniform(-1.0, 1.0, (NODES,) * 3)
         single = Spline(volume, prefilter=False, dtype=np.float32)
         double = Spline(volume, prefilter=False)
-        if "Dr.Jit" in peers:
-            least = alternate(
-                {
-                    "ours": lambda single=single, points=points: single.value_and_gradient(points),
-                    "theirs": peers["Dr.Jit"](volume, points),
-                    "double": lambda double=double, points=points: double.value_and_gradient(points),
-                },
-                REPEATS,
-            )
-            detail = f"value and gradient in float32, ns a point: {nanoseconds(least, number)}"
-            ratio = least["theirs"] / least["ours"]
-            yield Row(f"V1 Dr.Jit, {label}", ratio, DRJIT, ">=", "", detail)
-        else:
-            yield Row(f"V1 Dr.Jit, {label}", None, DRJIT, ">=", "", missing["Dr.Jit"])
-        least = alternate(
-            {
-                "ours": lambda double=double, points=points: double.value(points),
-                "theirs": peers["ndimage"](volume, points),
-            }
-        )
-        detail = f"values alone in float64, ns a point: {nanoseconds(least, number)}"
-        yield Row(f"V1 ndimage, {label}", least["theirs"] / least["ours"], NDIMAGE, ">=", "", detail)
         few = points[: number // 8]
-        least = alternate(
-            {
-                "ours": lambda double=double, few=few: double.value_and_gradient(few),
-                "theirs": peers["NdBSpline"](volume, few),
-            }
-        )
-        detail = f"value and gradient in float64, ns a point: {nanoseconds(least, len(few))}"
-        yield Row(f"V1 NdBSpline, {label}", least["theirs"] / least["ours"], ND_BSPLINE, ">=", "", detail)
+        for name, goal, repeats, ours, given, what in (
+            ("Dr.Jit", DRJIT, REPEATS, single.value_and_gradient, points, "value and gradient in float32"),
+            ("ndimage", NDIMAGE, FEW_REPEATS, double.value, points, "values alone in float64"),
+            (
+                "NdBSpline",
+                ND_BSPLINE,
+                FEW_REPEATS,
+                double.value_and_gradient,
+                few,
+                "value and gradient in float64",
+            ),
+        ):
+            target = f"V1 {name}, {label}"
+            if name in missing:
+                yield Row(target, None, goal, ">=", "", missing[name])
+                continue
+            runs = {"ours": partial(ours, given), "theirs": peers[name](volume, given)}
+            if ours == single.value_and_gradient:
+                runs["double"] = partial(double.value_and_gradient, given)
+            least = alternate(runs, repeats)
+            detail = f"{what}, ns a point: {nanoseconds(least, len(given))}"
+            yield Row(target, least["theirs"] / least["ours"], goal, ">=", "", detail)
 
 
 def random_points(number: int) -> np.ndarray:
