@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from benchmarks.eikonal._reference_times import edge_times, equation_error
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bentray_kernels import eikonal
@@ -17,7 +17,6 @@ def rough(seed, ndim):
 
 @pytest.mark.parametrize("ndim", [2, 3])
 @given(seed=st.integers(0, 2**32 - 1))
-@settings(deadline=None)
 def test_first_order_methods_solve_the_equation_and_none_is_much_later_than_along_edges(ndim, seed):
     speed, source = rough(seed, ndim)
     latest = edge_times(speed, source)

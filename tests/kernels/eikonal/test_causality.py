@@ -144,7 +144,6 @@ def test_each_time_follows_from_the_earlier_ones_in_whatever_order_nodes_come(nd
 
 
 @given(seed=SEEDS, size=st.integers(1, 60), ties=st.booleans())
-@settings(deadline=None)
 def test_the_order_of_arrival_is_that_of_a_stable_sort(seed, size, ties):
     rng = np.random.default_rng(seed)
     times = rng.uniform(0.0, 3.0, size) ** 4

@@ -47,7 +47,6 @@ def tissue(seed, shape=(70, 60), size=0.08):
 
 
 @given(shape=SHAPES, part=PARTS)
-@settings(deadline=None)
 def test_water_is_crossed_along_straight_lines(shape, part):
     source = place(shape, part)
     tof = factored_sweeping(PointSource.checked(np.full(shape, WATER), SPACING, source))
@@ -74,7 +73,6 @@ def test_as_accurate_as_the_accurate_solver_in_tissue(seed, part):
 
 
 @given(part=st.tuples(st.floats(0.2, 0.8), st.floats(0.2, 0.8)), slope=st.floats(0.01, 0.03))
-@settings(deadline=None)
 def test_exact_in_a_constant_gradient_around_the_source(part, slope):
     """The times of the first nodes decide about all later ones; the exact time is known."""
     shape = (41, 41)

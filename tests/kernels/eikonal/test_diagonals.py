@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bentray_kernels.eikonal.diagonals import FIRST, Diagonals, include
@@ -19,7 +19,6 @@ def numbered(shape):
 
 
 @given(shape=SHAPES, flipped=st.booleans())
-@settings(deadline=None)
 def test_a_grid_comes_back_whole(shape, flipped):
     grid = Diagonals.from_shape(shape)
     plain = numbered(shape)
@@ -50,7 +49,6 @@ def test_neighbours_lie_in_the_rows_before_and_after():
 
 
 @given(shape=SHAPES, flipped=st.booleans())
-@settings(deadline=None)
 def test_the_border_can_be_left_out_and_values_scaled(shape, flipped):
     grid = Diagonals.from_shape(shape)
     inside = np.arange(np.prod(shape), dtype=float)
@@ -68,7 +66,6 @@ def test_the_border_can_be_left_out_and_values_scaled(shape, flipped):
 
 
 @given(shape=SHAPES, seed=st.integers(0, 99))
-@settings(deadline=None)
 def test_nodes_are_put_where_storing_puts_them(shape, seed):
     grid = Diagonals.from_shape(shape)
     plain = numbered(shape)
@@ -82,7 +79,6 @@ def test_nodes_are_put_where_storing_puts_them(shape, seed):
 
 
 @given(shape=SHAPES, seed=st.integers(0, 99), many=st.booleans())
-@settings(deadline=None)
 def test_turning_what_changed_turns_the_whole(shape, seed, many):
     grid = Diagonals.from_shape(shape)
     rng = np.random.default_rng(seed)
@@ -132,7 +128,6 @@ def test_neighbours_of_a_node_are_those_of_the_grid(shape):
 
 
 @given(shape=SHAPES, seed=st.integers(0, 99))
-@settings(deadline=None)
 def test_flipping_keeps_every_node(shape, seed):
     grid = Diagonals.from_shape(shape)
     rng = np.random.default_rng(seed)

@@ -199,7 +199,6 @@ def ranges_of(shape: tuple[int, int, int], seed: int) -> CellRanges:
 
 
 @given(shape=st.tuples(*[st.integers(1, 9)] * 3), seed=st.integers(0, 999))
-@settings(deadline=None)
 def test_a_node_holds_what_its_cells_hold(shape, seed):
     cells = ranges_of(shape, seed)
     octree = octree_of(cells, ISOS)

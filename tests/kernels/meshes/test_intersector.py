@@ -127,7 +127,6 @@ def test_a_mesh_without_faces_is_rejected():
 
 
 @given(seed=st.integers(0, 2**32 - 1))
-@settings(deadline=None)
 def test_distance_and_weights_solve_the_linear_system(seed):
     random = np.random.default_rng(seed)
     corners, point, direction = (

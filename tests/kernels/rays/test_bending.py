@@ -188,7 +188,6 @@ def zigzag(rng, count, ndim, size=0.15):
 
 @pytest.mark.parametrize("ndim", [2, 3])
 @given(seed=SEEDS)
-@settings(deadline=None)
 def test_normals_are_orthonormal_and_normal_to_the_path(ndim, seed):
     path = zigzag(np.random.default_rng(seed), 7, ndim, 0.4)
     work = Medium(np.random.default_rng(seed), ndim).work(path)
@@ -222,7 +221,6 @@ def test_the_step_of_a_homogeneous_medium_is_that_of_the_exact_hessian(ndim, cou
 
 @pytest.mark.parametrize(("ndim", "slope"), [(2, 0.1), (2, 0.0), (3, 0.0)])
 @given(seed=SEEDS)
-@settings(deadline=None)
 def test_the_medium_bends_the_hessian_of_one_point_exactly(ndim, slope, seed):
     """No term of one inner point is neglected, in 3-D where the slowness has no slope."""
     rng = np.random.default_rng(seed)

@@ -51,7 +51,6 @@ def test_snells_law_in_the_plane_of_incidence(seeds, ratio):
 
 
 @given(seed=st.integers(0, 10**6), ratio=st.floats(0.3, 3.0))
-@settings(deadline=None)
 def test_paths_are_reversible(seed, ratio):
     direction, normal = unit(seed), unit(seed + 1)
     bent, share, passed = bend(tuple(direction), tuple(normal), ratio)

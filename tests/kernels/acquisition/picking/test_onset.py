@@ -68,7 +68,6 @@ def test_an_onset_at_the_rim_of_the_window_is_none():
 
 
 @given(seed=st.integers(0, 2**32 - 1), offset=st.floats(-5.0, 5.0), position=st.floats(70.0, 130.0))
-@settings(deadline=None)
 def test_aic_is_the_split_of_the_lowest_criterion_whatever_the_offset(seed, offset, position):
     """Maeda's criterion by NumPy's variances, which do not contain the mean."""
     begin, end = 20, 180

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bentray_kernels.errors import InvalidInput
@@ -147,7 +147,6 @@ def flat_chart(patch, turn=0.0):
 
 
 @given(st.floats(-0.7, 0.7), st.integers(8, 40))
-@settings(deadline=None)
 def test_inside_the_values_are_those_of_the_place(turn, size):
     chart = flat_chart(flat_patch(6, 6), turn)
     raster = rasterised(chart, size)

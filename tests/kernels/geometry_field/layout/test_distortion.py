@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bentray_kernels.geometry_field.layout.distortion import (
@@ -52,7 +52,6 @@ def test_area_stretch_is_one_at_best():
 
 
 @given(st.lists(st.floats(0.1, 1.0), min_size=4, max_size=40), st.floats(0.0, 6.0))
-@settings(deadline=None)
 def test_stars_do_not_cross_themselves(radii, turn):
     angle = turn + 2 * np.pi * np.arange(len(radii)) / len(radii)
     star = np.array(radii)[:, np.newaxis] * np.column_stack((np.cos(angle), np.sin(angle)))
@@ -61,7 +60,6 @@ def test_stars_do_not_cross_themselves(radii, turn):
 
 
 @given(st.integers(4, 60), st.floats(0.0, 6.0), st.data())
-@settings(deadline=None)
 def test_two_corners_of_a_round_polygon_that_change_places_make_it_cross_itself(number, turn, data):
     angle = turn + 2 * np.pi * np.arange(number) / number
     polygon = np.column_stack((np.cos(angle), 0.5 * np.sin(angle)))

@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bentray_kernels.compilation.compiled import kernel
@@ -246,7 +246,6 @@ def test_numbers_are_those_of_figure_24():
             np.testing.assert_allclose(position[across], [(x + 0.5) / n, (y + 0.5) / n])
 
 
-@settings(deadline=None)
 @given(n=NUMBERS, seed=st.integers(0, 2**32 - 1))
 def test_a_line_between_two_samples_has_their_numbers(n, seed):
     pairs = np.random.default_rng(seed).integers(0, 6 * n * n, (50, 2))
@@ -259,7 +258,6 @@ def test_a_line_between_two_samples_has_their_numbers(n, seed):
         np.testing.assert_array_equal(lines(start, along, n), pairs.T)
 
 
-@settings(deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_lines_that_miss_the_cube_have_none(seed):
     random = np.random.default_rng(seed)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bentray_kernels.compilation.compiled import kernel
@@ -179,7 +179,6 @@ def product(faces, xs, ys):
 
 @pytest.mark.parametrize("n", [2, 3, 5])
 @given(faces=st.tuples(st.integers(0, 5), st.integers(0, 5)), ends=st.tuples(*[PLACES] * 4))
-@settings(deadline=None)
 def test_products_of_linear_functions_are_exact_between_samples_and_constant_beyond(n, faces, ends):
     entries = table(n, product)
     s, t = faces

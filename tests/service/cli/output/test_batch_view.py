@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
@@ -28,7 +28,6 @@ def entry(name: str, state: str) -> Entry:
 STATES = st.sampled_from(["waiting", "running", "succeeded", "failed", "skipped"])
 
 
-@settings(deadline=None)
 @given(states=st.lists(STATES, min_size=1, max_size=60), height=st.integers(10, 40))
 def test_it_fits_the_terminal_and_shows_what_runs_first(states: list[str], height: int) -> None:
     entries = [entry(f"scan{number}", state) for number, state in enumerate(states)]
