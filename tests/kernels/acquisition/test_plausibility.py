@@ -18,7 +18,7 @@ from bentray_kernels.wave.medium import Medium
 from ..straight_scans import ring_scan
 from .test_arrangement import on_ring, scan
 
-POSITION, ABSOLUTE, DELTA = "geometry/element_position_m", "traveltime/tof_s", "traveltime/delta_tof_s"
+POSITION, DELTA = "geometry/element_position_m", "traveltime/delta_tof_s"
 
 
 def ring(elements=32, radius_m=0.1, **changes):

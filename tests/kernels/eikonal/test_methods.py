@@ -12,11 +12,6 @@ from ...effort import effort
 from ...opencl import methods
 
 
-def rough_speed(seed, shape):
-    """Speeds between 0.2 and 5 m/s without any smoothness."""
-    return np.random.default_rng(seed).uniform(0.2, 5.0, shape)
-
-
 def four_decade_problem(seed, longest, ndim):
     """Speeds over four decades and a source anywhere, on a corner, on a node or in the middle of a cell."""
     rng = np.random.default_rng(seed)
