@@ -11,9 +11,10 @@ from scipy.ndimage import gaussian_filter
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.tomography import Reconstruction, Settings, reconstruct
+from bentray_kernels.tomography.gauss_newton.gauss_newton_step import trace_rays
 from bentray_kernels.tomography.problem import Problem
 from bentray_kernels.tomography.stage_graphs import batches_of
-from bentray_kernels.tomography.uncertainty.ray_uncertainty import ray_uncertainty, trace_probed_rays
+from bentray_kernels.tomography.uncertainty.ray_uncertainty import ray_uncertainty
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 
@@ -199,7 +200,7 @@ def seconds_of_uncertainty(dataset: Dataset, result: Reconstruction) -> float:
     problem = Problem.from_dataset(dataset, result.settings, 0).each_pair_once()
     slowness = 1.0 / result.speed
     blocks = [
-        trace_probed_rays(problem, result.settings, slowness, batch)
+        trace_rays(problem, replace(result.settings, rays="curved"), slowness, batch)
         for batch in batches_of(problem.active_emitters)
     ]
     ray_uncertainty(problem, result.settings, slowness, blocks)

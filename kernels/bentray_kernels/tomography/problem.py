@@ -142,7 +142,8 @@ class Problem(pairs.Pairs):
             return halves
 
         ratio = None if self.log_ratio is None else once(self.log_ratio)
-        twice = any(_measured_twice(self.delta_tof[of_ring]) for of_ring in members)
+        there = (np.isfinite(self.delta_tof[of_ring]) for of_ring in members)
+        twice = any(np.triu(known & known.T, 1).any() for known in there)
         # The mean of two times has half the variance.
         noise = self.noise_s / math.sqrt(2.0) if twice else self.noise_s
         return replace(self, delta_tof=once(self.delta_tof), log_ratio=ratio, noise_s=noise)
@@ -153,11 +154,6 @@ def image_side(dataset: Dataset, nodes: int) -> float:
     flat = dataset.element_position_m[:, :2]
     reach = float(np.abs(flat - 0.5 * (flat.min(axis=0) + flat.max(axis=0))).max())
     return 2.0 * reach * (nodes - 1) / (nodes - 1 - 2 * MARGIN_NODES)
-
-
-def _measured_twice(data: Floats) -> bool:
-    """Whether a square matrix has a pair in both places."""
-    return bool(np.triu(np.isfinite(data) & np.isfinite(data.T), 1).any())
 
 
 def _once(data: Floats) -> Floats:

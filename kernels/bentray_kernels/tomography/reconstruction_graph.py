@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 from ..arrays import Floats, Ints
 from ..task_graph import ResumableGraph, Task
 from . import attenuation, resolution
 from .finite_frequency import width_in_nodes
+from .gauss_newton import gauss_newton_step
 from .gauss_newton.gauss_newton_step import Iterate
 from .gauss_newton.linearisation import Rows
 from .grid_schedule import initial_slowness
@@ -17,7 +18,7 @@ from .result import Iteration, Progress
 from .sart.sart_step import State
 from .scan import Scan
 from .stage_graphs import GaussNewtonStage, SartStage, Stage, batches_of, trace_rays
-from .uncertainty.ray_uncertainty import Uncertainty, ray_uncertainty, trace_probed_rays
+from .uncertainty.ray_uncertainty import Uncertainty, ray_uncertainty
 
 
 class TomographyGraph(ResumableGraph, Protocol):
@@ -257,7 +258,10 @@ def check_resolution(scan: Scan, index: int, _slowness: Floats, rows: list[Rows]
 def trace_uncertainty_rays(scan: Scan, index: int, slowness: Floats, batch: int) -> Rows:
     """Task: bent rays of one batch of emitters through the finished image, each pair once."""
     problem = scan.problem(index).each_pair_once()
-    return trace_probed_rays(problem, scan.stages()[-1], slowness, batches_of(problem.active_emitters)[batch])
+    emitters = batches_of(problem.active_emitters)[batch]
+    # Where straight rays were used, the times along bent rays show what that neglects.
+    settings = replace(scan.stages()[-1], rays="curved")
+    return gauss_newton_step.trace_rays(problem, settings, slowness, emitters)
 
 
 def estimate_uncertainty(scan: Scan, index: int, slowness: Floats, rows: list[Rows]) -> Uncertainty:

@@ -99,10 +99,7 @@ def trace_settings() -> Iterator[dict[str, Any]]:
 
 def digitised(scan: Dataset) -> Dataset:
     """A scan with traces of 16-bit integers, as from scanners."""
-    traces = scan.waveform
-    assert traces is not None
-    assert traces.water is not None
-    pair = (traces.object, traces.water)
+    pair = (scan.traces.object, scan.traces.water_traces)
     step = max(float(np.abs(traces).max()) for traces in pair) / np.iinfo(np.int16).max
     both = [(traces / step).round().astype(np.int16) for traces in pair]
     return replace(scan, waveform=Waveform(both[0], both[1], scale=step))

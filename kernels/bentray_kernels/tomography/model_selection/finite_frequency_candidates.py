@@ -43,8 +43,10 @@ def finite_frequency_candidates(dataset: Dataset, settings: Settings) -> list[di
     if dataset.center_frequency_hz is None or settings.decomposition == "volume":
         return []
     wavelength = dataset.water_speed_mps / dataset.center_frequency_hz
+    # The larger extent of the array along x or y: the diameter of a ring.
+    width = float(np.ptp(dataset.element_position_m[:, :2], axis=0).max())
     more = {
-        "ray_width_m": min(wavelength, FRESNEL_PART * math.sqrt(wavelength * array_width(dataset))),
+        "ray_width_m": min(wavelength, FRESNEL_PART * math.sqrt(wavelength * width)),
         "penalty_strength": STIFFER * settings.gauss_newton.penalty_strength,
     }
     return [*({**changes, **more} for changes in WIDE), THIN]
@@ -68,11 +70,6 @@ def choose_finite_frequency(candidates: Sequence[Candidate], mean_time_s: float)
     best = straight if mean_misfit(straight) < factor * mean_misfit(bent) else bent
     thin = min((t for t in candidates if "ray_width_m" not in t.settings), key=mean_misfit)
     return None if mean_misfit(thin) < EXACT * mean_misfit(best) else best
-
-
-def array_width(dataset: Dataset) -> float:
-    """The larger extent of the array along x or y, m: the diameter of a ring."""
-    return float(np.ptp(dataset.element_position_m[:, :2], axis=0).max())
 
 
 def mean_time(dataset: Dataset) -> float:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from ...arrays import Floats, Ints
+from ...arrays import Floats
 from ..finite_frequency import width_in_nodes
 from ..gauss_newton import huber
-from ..gauss_newton.gauss_newton_step import trace_rays
 from ..gauss_newton.linearisation import Rows, ray_density
 from ..problem import Problem
 from ..settings import Settings
@@ -50,21 +49,6 @@ class Uncertainty:
     caution: str = ""
 
 
-def trace_probed_rays(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints) -> Rows:
-    """Rows of bent rays through an image, whatever rays it was made with.
-
-    Where straight rays were used, the times along bent rays show what that neglects.
-
-    Args:
-        problem: with each pair once, see ``Problem.each_pair_once``: the time of a reverse pair that was
-            filled in is no measurement.
-        settings: of the image.
-        slowness: of the region's shape, s/m.
-        emitters: rows of the problem's data, at least one.
-    """
-    return trace_rays(problem, replace(settings, rays="curved"), slowness, emitters)
-
-
 def ray_uncertainty(
     problem: Problem, settings: Settings, slowness: Floats, blocks: Sequence[Rows], index: int = 0
 ) -> Uncertainty:
@@ -77,10 +61,11 @@ def ray_uncertainty(
     mean; and errors of the model, see ``model_errors``.
 
     Args:
-        problem: with each pair once.
+        problem: with each pair once, see ``Problem.each_pair_once``: the time of a reverse pair that was
+            filled in is no measurement.
         settings: of the image.
         slowness: of the region's shape, s/m.
-        blocks: rows of all emitters, in their order; see ``trace_probed_rays``.
+        blocks: rows of all emitters along bent rays, in their order.
         index: of the slice, for the random numbers.
     """
     region, spacing = problem.region, problem.spacing
