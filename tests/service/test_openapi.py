@@ -1,10 +1,15 @@
-"""The committed openapi.json equals the schema of the service."""
+"""The committed openapi.json equals the schema of the service; a parameter for each field of a view."""
 
+import inspect
 import json
 import re
 import shlex
+from dataclasses import fields
 from pathlib import Path
+from typing import Any, get_args
 
+import pytest
+from fastapi.params import Query
 from pydantic import TypeAdapter
 
 from bentray_service.openapi import description
@@ -13,6 +18,9 @@ from bentray_service.routes.models.batch_records import BatchRequest
 from bentray_service.routes.models.name_changes import DatasetChanges, JobChanges, ScanCorrection
 from bentray_service.routes.models.project_records import MemberRequest, ProjectRequest
 from bentray_service.routes.models.upload_records import DirectUploadRequest, PartsRequest
+from bentray_service.routes.pictures import view_dependency
+from bentray_workers.rendering.field_view import FieldView
+from bentray_workers.rendering.refraction_view import RefractionView
 
 COMMITTED = Path(__file__).parents[2] / "openapi.json"
 
@@ -94,3 +102,16 @@ def test_every_operation_has_an_example_by_curl():
         }
         assert needed <= {header.partition(":")[0].lower() for header in headers}, name
         assert "None" not in " ".join(headers), name
+
+
+@pytest.mark.parametrize("kind", [RefractionView, FieldView])
+def test_every_field_is_a_parameter(kind: type[Any]) -> None:
+    parameters = dict(inspect.signature(view_dependency(kind)).parameters)
+    del parameters["request"]
+    assert list(parameters) == [field.name for field in fields(kind)]
+    for field in fields(kind):
+        query = next(one for one in get_args(parameters[field.name].annotation) if isinstance(one, Query))
+        assert query.description
+        assert query.description.startswith(field.metadata["description"])
+        default = parameters[field.name].default
+        assert (tuple(default) if isinstance(default, list) else default) == field.default

@@ -1,4 +1,4 @@
-"""A bucket as the store: opened for one database, and what happens when it is away, damaged or too large."""
+"""A bucket as the store: its objects, opened for one database, and what happens when it is away or bad."""
 
 import os
 import secrets
@@ -8,10 +8,12 @@ from concurrent.futures import ThreadPoolExecutor
 from types import SimpleNamespace
 
 import pytest
+from obstore.exceptions import PermissionDeniedError
 
 from bentray_kernels.errors import InvalidInput
 from bentray_service.errors import StorageUnavailable
 from bentray_service.files import bucket as bucket_module
+from bentray_service.files import bucket as module
 from bentray_service.files import bucket_store
 from bentray_service.files.bucket import Bucket
 from bentray_service.files.bucket_store import FORGOTTEN_S, LEFT_S, MARK, RECENT_S, BucketStore, open_store
@@ -231,3 +233,66 @@ def test_rejects_missing_or_unresponsive_buckets(databases, tmp_path, bucket_url
     s3_server.away.set()
     with pytest.raises(InvalidInput, match="error of the bucket"):
         open_store(bucket_url, tmp_path, databases[0], 0)
+
+
+def test_lists_and_removals_go_beyond_a_page(bucket_url):
+    bucket = Bucket(bucket_url)
+    names = [f"a/{number:04d}" for number in range(1003)]
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(lambda name: bucket.put_metadata(name, {}), [*names, "b"]))
+    assert sorted(item["path"] for item in bucket.listed("a/")) == names
+    bucket.remove([*names, "c"])
+    assert [item["path"] for item in bucket.listed()] == ["b"]
+
+
+def test_two_prefixes_of_a_bucket_do_not_meet(bucket_url):
+    first, two = Bucket(bucket_url), Bucket(f"{bucket_url}-2/")
+    first.put_metadata("a", {"of": "one"})
+    two.put_metadata("a", {"of": "two"})
+    assert (first.metadata("a")["of"], two.metadata("a")["of"]) == ("one", "two")
+    assert [held["path"] for held in first.listed()] == ["a"]
+
+
+def test_a_removal_that_is_rejected_is_no_removal(bucket_url, monkeypatch):
+    bucket = Bucket(bucket_url)
+
+    def refuse(*_):
+        raise PermissionDeniedError("AccessDenied")
+
+    monkeypatch.setattr(module.obstore, "delete", refuse)
+    with pytest.raises(StorageUnavailable):
+        bucket.remove(["a"])
+
+
+@pytest.mark.parametrize(
+    "ask", [lambda it: list(it.listed()), lambda it: it.put_metadata("a", {}), lambda it: it.remove("a")]
+)
+def test_missing_bucket_is_not_a_missing_object(bucket_url, ask):
+    with pytest.raises(StorageUnavailable):
+        ask(Bucket(f"{bucket_url.removesuffix('/scans')}-missing"))
+
+
+def test_unresponsive_bucket_times_out(bucket_url, s3_server, monkeypatch):
+    monkeypatch.setattr(module, "ANSWER_S", 0.5)
+    bucket = Bucket(bucket_url)
+    s3_server.silent.set()
+    try:
+        with pytest.raises(StorageUnavailable):
+            bucket.metadata("a")
+    finally:
+        s3_server.silent.clear()
+    assert bucket.metadata("a") is None
+
+
+def test_credentials_come_from_a_file_too(bucket_url, monkeypatch, tmp_path):
+    for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
+        monkeypatch.delenv(name)
+    secret = tmp_path / "credentials"
+    secret.write_text(
+        "[default]\naws_access_key_id = wrong\n[lab]\naws_access_key_id = named\naws_secret_access_key = s\n"
+    )
+    monkeypatch.setenv("AWS_SHARED_CREDENTIALS_FILE", str(secret))
+    monkeypatch.setenv("AWS_PROFILE", "lab")
+    bucket = Bucket(bucket_url)
+    bucket.put_metadata("a", {})
+    assert "named" in bucket.put_url("a", 60)

@@ -1,14 +1,16 @@
-"""The lane of short jobs: they run beside long tasks that hold every worker; long ones leave it."""
+"""The lane of short jobs beside long tasks that hold every worker, and results that leave the workers."""
 
+import gc
 import threading
 import time
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from bentray_kernels.task_graph import Task
+from bentray_kernels.task_graph import POLL_S, Task
 from bentray_workers.cluster.capacities import WorkerCapacity
 from bentray_workers.cluster.fair_shares import Shares
 from bentray_workers.cluster.resources import DRAWING, OFFERED, RECONSTRUCTION, SHORT
@@ -16,9 +18,17 @@ from bentray_workers.cluster.short_lane import LEAVES_S, LONG_LANE, SHORT_LANE, 
 from bentray_workers.cluster.task_pool import run_job
 
 PATIENCE_S = 60.0
+
+
 MIB = 2**20
+
+
 WORKER = WorkerCapacity(2048 * MIB, tuple(OFFERED))
+
+
 PLAN = {"lane": "recon", "largest_bytes": 30 * MIB}
+
+
 # Released when both long tasks have been seen beside a short job.
 BEGUN, LEAVE = threading.Semaphore(0), threading.Event()
 
@@ -119,3 +129,17 @@ def test_workers_of_an_earlier_version_have_no_such_lane() -> None:
     assert not is_short(PLAN, 2.0, [earlier])
     assert is_short(PLAN, 2.0, [earlier, WORKER])
     assert is_short({**PLAN, "largest_bytes": 2**40}, 2.0, [WorkerCapacity(0, tuple(OFFERED))])
+
+
+def test_no_result_of_a_long_task_stays_on_its_worker(cluster: Any, tmp_path: Path) -> None:
+    futures, held = cluster.client.futures, []
+    graph = Graph(partial(time.sleep, 1.5 * POLL_S), 5, at_once=False)
+    gc.collect()
+    gc.disable()
+    try:
+        run_job(cluster.client, graph, tmp_path, on_saved=lambda: held.append(len(futures)))
+    finally:
+        gc.enable()
+    # Releases are messages: the last one may be on its way.
+    assert len(held) == 5
+    assert max(held) - held[0] < 2

@@ -12,11 +12,15 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.task_graph import Cancelled, ThreadPool, run
 from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography import reconstruct as reconstruct_here
+from bentray_kernels.tomography.waveform.band_inversion import Model
+from bentray_kernels.tomography.waveform.refinement_graph import evaluate_emitter
 from bentray_kernels.tomography.waveform.wave_scan import WaveScan
+from bentray_kernels.wave import time_blocks
 from bentray_workers.cluster.job_cancellation import JobEnded
 from bentray_workers.files.dataset import read_dataset, write_dataset
-from bentray_workers.files.picking_files import read_findings
+from bentray_workers.files.picking_files import ScanFindings, read_findings, write_findings
 from bentray_workers.reconstruction import reconstruction_run
+from bentray_workers.reconstruction.file_scan import FileSource
 from bentray_workers.reconstruction.memory import picking_memory
 from bentray_workers.reconstruction.picking_graph import (
     PICKED,
@@ -33,6 +37,8 @@ from ...kernels.tomography.waveform.scans import SETTINGS
 from ...kernels.tomography.waveform.scans import scan as wave_scan
 
 ELEMENTS = 16
+
+
 PLAN = Settings(method="sart", nodes=24, iterations=1)
 
 
@@ -276,3 +282,19 @@ def test_waves_are_refined_from_channels_put_back(tmp_path, monkeypatch):
     assert set(put_right.traces) == set(clean_one.traces)
     for emitter, traces in clean_one.traces.items():
         np.testing.assert_array_equal(put_right.traces[emitter], traces)
+
+
+def test_wave_comparison_stops_with_its_job(tmp_path, monkeypatch):
+    path, folder = tmp_path / "scan.h5", tmp_path / "job"
+    write_dataset(path, wave_scan())
+    folder.mkdir()
+    write_findings(folder / "findings.json", ScanFindings((), examined=True, changed=False))
+    stamp = path.stat().st_mtime_ns
+    waves = WaveScan(FileSource(path, stamp, path, stamp, folder / "findings.json"), SETTINGS)
+    problem = waves.problem(0)
+    water = Model(problem.water.speed + 0.0 * problem.region)
+    assert evaluate_emitter(waves, 0, water, 0).misfit > 0.0
+    monkeypatch.setattr(time_blocks, "BLOCK", 10**5)
+    folder.rename(tmp_path / "job.ended")
+    with pytest.raises(JobEnded):
+        evaluate_emitter(waves, 0, water, 0)
