@@ -18,6 +18,12 @@ from .datasets import small
 PLACE = "traveltime/delta_tof_s"
 
 
+@pytest.fixture
+def path(tmp_path):
+    write_dataset(tmp_path / "d.h5", small())
+    return tmp_path / "d.h5"
+
+
 def external_link(file, folder):
     with h5py.File(folder / "other.h5", "w") as other:
         other["secret"] = np.zeros((12, 24))
@@ -43,9 +49,7 @@ def external_storage(file, folder):
 
 
 @pytest.mark.parametrize("build", [external_link, external_group, virtual, external_storage])
-def test_data_elsewhere_are_not_read(tmp_path, build):
-    path = tmp_path / "d.h5"
-    write_dataset(path, small())
+def test_data_elsewhere_are_not_read(path, tmp_path, build):
     with h5py.File(path, "a") as file:
         del file[PLACE]
         build(file, tmp_path)
@@ -55,9 +59,7 @@ def test_data_elsewhere_are_not_read(tmp_path, build):
     assert "damaged" not in refused.value.value
 
 
-def test_unknown_members_are_not_opened(tmp_path):
-    path = tmp_path / "d.h5"
-    write_dataset(path, small())
+def test_unknown_members_are_not_opened(path):
     with h5py.File(path, "a") as file:
         file["more"] = h5py.ExternalLink("/dev/zero", "/x")
         file.create_dataset("text", data=["a"] * 10)
@@ -72,16 +74,12 @@ def test_unknown_members_are_not_opened(tmp_path):
         (Limits(text=10), "@format"),
     ],
 )
-def test_the_limits_are_the_callers(tmp_path, limits, field):
-    path = tmp_path / "d.h5"
-    write_dataset(path, small())
+def test_the_limits_are_the_callers(path, limits, field):
     with pytest.raises(InvalidInput, match=f"^{field}: "), opened(path, limits) as reader:
         dataset_of(reader, waveform_in)
 
 
-def test_text_is_made_printable(tmp_path):
-    path = tmp_path / "d.h5"
-    write_dataset(path, small())
+def test_text_is_made_printable(path):
     with h5py.File(path, "a") as file:
         file.attrs["title"] = np.bytes_(b"a\x00b\x1b[31mc\xff")
     title = read_dataset(path).title
@@ -89,9 +87,7 @@ def test_text_is_made_printable(tmp_path):
     assert title.isprintable()
 
 
-def test_the_file_is_closed_again(tmp_path):
-    path = tmp_path / "d.h5"
-    write_dataset(path, small())
+def test_the_file_is_closed_again(path):
     with opened(path) as reader:
         assert reader.has("geometry")
         assert not reader.has("geometry/nothing")
