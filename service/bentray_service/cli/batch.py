@@ -211,7 +211,7 @@ def run_on_service(batch: Batch, url: str, *, wait: bool, as_json: bool) -> bool
     Raises:
         InvalidInput: for an invalid setting.
     """
-    from ..client import Client
+    from ..client import Client, ClientError
 
     with client_errors(), Client(url, on_wait=remark) as client:
         waiting = _upload_all(client, batch)
@@ -225,8 +225,12 @@ def run_on_service(batch: Batch, url: str, *, wait: bool, as_json: bool) -> bool
         remark(f"{record.id}: it goes on if this command is interrupted, and the same command finds it again")
         for job in client.wait_batch(record, progress=True).jobs:
             for entry in waiting.get(job.dataset or "", ()):
-                with _ending(entry):
+                try:
                     _download(client, job, batch, entry)
+                except (ClientError, InvalidInput, OSError) as error:
+                    entry.end("failed", str(error).splitlines()[0])
+                else:
+                    entry.end("succeeded")
     return True
 
 
@@ -264,19 +268,6 @@ def _start(client: Client, batch: Batch, datasets: list[str]) -> BatchRecord:
         if same and record.state in ("queued", "running"):
             return record
     return client.submit_batch(datasets, asked, name=batch.folder.resolve().name)
-
-
-@contextmanager
-def _ending(entry: Entry) -> Iterator[None]:
-    """End an entry: failed with the reason if the block raises an error."""
-    from ..client import ClientError
-
-    try:
-        yield
-    except (ClientError, InvalidInput, OSError) as error:
-        entry.end("failed", str(error).splitlines()[0])
-    else:
-        entry.end("succeeded")
 
 
 def _download(client: Client, job: BatchJobRecord, batch: Batch, entry: Entry) -> None:

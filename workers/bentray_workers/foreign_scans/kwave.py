@@ -39,7 +39,7 @@ RATE = "acquisition/sampling_rate_hz"
 SAME_STEP = 1e-6
 
 
-class KWave:
+class KWave(Npz):
     """The arrays of one zip; see ``Arrays``: those of its geometry, and the traces from its outputs.
 
     Args:
@@ -51,10 +51,9 @@ class KWave:
     """
 
     kind = "outputs of k-Wave"
-    reversed_axes = False
 
     def __init__(self, archive: zipfile.ZipFile, scratch: Path) -> None:
-        self._zip = archive
+        self._archive = archive
         self._scratch = scratch
         with rejecting_damage("file", WHOLE):
             check_zip(archive, MAX_OUTPUTS)
@@ -65,7 +64,7 @@ class KWave:
             f"waveform/{which}": sorted(n for n in names if OUTPUT.fullmatch(n) and n.startswith(which))
             for which in ("object", "water")
         }
-        self._geometry = Npz(io.BytesIO(read_member(archive, GEOMETRY, LARGEST_WHOLE)))
+        super().__init__(io.BytesIO(read_member(archive, GEOMETRY, LARGEST_WHOLE)))
         first = self._outputs["waveform/object"] or self._outputs["waveform/water"]
         with self._output(first[0]) as reader:
             self._shape = self._pressure(first[0], reader).shape[::-1]
@@ -73,14 +72,14 @@ class KWave:
 
     def names(self) -> tuple[str, ...]:
         traces = [name for name, outputs in self._outputs.items() if outputs]
-        return (*self._geometry.names(), *traces, RATE)
+        return (*super().names(), *traces, RATE)
 
     def declared(self, name: str) -> tuple[tuple[int, ...], np.dtype[Any]] | None:
         if name == RATE:
             return (), np.dtype(np.float64)
         outputs = self._outputs.get(name)
         if not outputs:
-            return self._geometry.declared(name)
+            return super().declared(name)
         shape = (len(outputs), *self._shape)
         size = 4 * int(np.prod(shape, dtype=np.float64))
         if size > LARGEST_TOTAL:
@@ -88,7 +87,7 @@ class KWave:
         return shape, np.dtype(np.float32)
 
     def whole(self, name: str) -> NDArray[Any]:
-        return np.array(1.0 / self._step) if name == RATE else self._geometry.whole(name)
+        return np.array(1.0 / self._step) if name == RATE else super().whole(name)
 
     def rows(self, name: str) -> Iterator[NDArray[Any]]:
         for output in self._outputs[name]:
@@ -123,7 +122,7 @@ class KWave:
 
     @contextmanager
     def _output(self, name: str) -> Iterator[Reader]:
-        member = member_file(self._zip, name, LARGEST_ROW, self._scratch)
+        member = member_file(self._archive, name, LARGEST_ROW, self._scratch)
         with member as path, _of(name), opened(path) as reader:
             yield reader
 
