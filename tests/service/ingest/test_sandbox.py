@@ -40,9 +40,8 @@ def test_a_good_file(scan, tmp_path):
 
 def test_not_hdf5(tmp_path):
     (tmp_path / "in").write_bytes(b"no HDF5 at all")
-    with pytest.raises(InvalidInput) as caught:
+    with pytest.raises(InvalidInput, match=r"; accepted: .*HDF5"):
         run(tmp_path / "in", tmp_path)
-    assert "HDF5" in caught.value.accepted
 
 
 def test_a_killed_reader_is_a_refused_file(program, scan, tmp_path):

@@ -77,9 +77,8 @@ def test_a_file_that_is_no_database(tmp_path):
 
 @pytest.mark.parametrize("address", ["nonsense", "nosuch://x/y", "postgresql://user:secret@127.0.0.1:1/x"])
 def test_a_wrong_address_is_rejected_without_its_password(address):
-    with pytest.raises(InvalidInput) as caught:
+    with pytest.raises(InvalidInput, match=r"^database_url: ") as caught:
         open_database(address)
-    assert caught.value.field == "database_url"
     assert "secret" not in str(caught.value)
 
 

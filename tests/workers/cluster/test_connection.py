@@ -114,9 +114,8 @@ def _loaded(module):
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense", "tcp://"])
 def test_missing_scheduler_is_named(address):
-    with pytest.raises(InvalidInput, match="scheduler_address") as refusal:
+    with pytest.raises(InvalidInput, match=r"scheduler_address.*a running Dask scheduler"):
         open_cluster(address, connect_timeout_s=0.5)
-    assert "a running Dask scheduler" in str(refusal.value)
 
 
 @pytest.mark.parametrize(

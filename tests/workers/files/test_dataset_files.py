@@ -152,11 +152,8 @@ def test_errors_name_field_value_and_accepted_values(tmp_path, case):
     with h5py.File(path, "a") as file:
         change(file)
     for read in (read_dataset, lambda path: copy_dataset(path, tmp_path / "copy.h5")):
-        with pytest.raises(InvalidInput) as refused:
+        with pytest.raises(InvalidInput, match=f"^{field}: found .+; accepted: .+"):
             read(path)
-        assert refused.value.field == field
-        assert refused.value.value
-        assert refused.value.accepted
     assert not (tmp_path / "copy.h5").exists()
 
 
@@ -179,9 +176,8 @@ def test_a_file_without_travel_times_and_traces_is_rejected(tmp_path):
 )
 def test_rejects_files_that_are_no_hdf5(tmp_path, content, found):
     (tmp_path / "d.h5").write_bytes(content)
-    with pytest.raises(InvalidInput, match=found) as refused:
+    with pytest.raises(InvalidInput, match=f"^file: found .*{found}"):
         read_dataset(tmp_path / "d.h5")
-    assert refused.value.field == "file"
     with pytest.raises(InvalidInput, match="No such file"):
         read_dataset(tmp_path / "absent.h5")
 

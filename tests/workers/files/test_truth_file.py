@@ -60,10 +60,8 @@ def test_a_numpy_file_is_centred_or_on_the_nodes_of_the_image(tmp_path: Path) ->
     np.save(file, np.full((21, 11), 1540.0))
     result = read_truth(file, image, [1e-3]).truth
     assert (result.spacing_m, result.origin_m) == ((1e-3, 1e-3), (-0.01, -0.005))
-    with pytest.raises(InvalidInput) as refused:
+    with pytest.raises(InvalidInput, match=r"^spacing: .*10 x 10 nodes"):
         read_truth(file, image)
-    assert refused.value.field == "spacing"
-    assert "10 x 10 nodes" in str(refused.value)
     with pytest.raises(InvalidInput, match="or 2"):
         read_truth(file, image, [1e-3] * 3)
 

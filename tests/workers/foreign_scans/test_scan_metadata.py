@@ -124,10 +124,8 @@ def test_an_assumed_temperature_is_recorded(tmp_path):
 )
 def test_names_unusable_values(tmp_path, given, field, accepted):
     savemat(tmp_path / "scan", own_variables(), appendmat=False)
-    with pytest.raises(InvalidInput) as refused:
+    with pytest.raises(InvalidInput, match=rf"^{field}: .*; accepted: .*{accepted}"):
         converted(tmp_path, **given)
-    assert refused.value.field == field
-    assert accepted in refused.value.accepted
 
 
 def test_water_that_contradicts_the_file_is_rejected(tmp_path):

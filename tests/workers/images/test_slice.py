@@ -93,17 +93,15 @@ def test_a_constant_image_is_drawn(tmp_path):
     ],
 )
 def test_bad_arguments_are_named(file, given, field, accepted):
-    with pytest.raises(InvalidInput) as refused:
+    with pytest.raises(InvalidInput, match=rf"^{field}: .*; accepted: .*{accepted}"):
         slice_png(file, **given)
-    assert refused.value.field == field
-    assert accepted in refused.value.accepted
 
 
 def test_a_quantity_that_the_file_lacks_is_rejected(tmp_path):
     write_reconstruction(tmp_path / "r.h5", replace(made(), attenuation=None))
-    with pytest.raises(InvalidInput, match="quantity") as refused:
+    accepted = "one of speed, coverage, recovery: this file has no other"
+    with pytest.raises(InvalidInput, match=f"^quantity: .*; accepted: {accepted}$"):
         slice_png(tmp_path / "r.h5", quantity="attenuation")
-    assert refused.value.accepted == "one of speed, coverage, recovery: this file has no other"
 
 
 def test_recovery_is_drawn_from_0_to_1_by_default(file, drawn):

@@ -50,9 +50,8 @@ def test_without_an_iso_value_the_middle_of_the_range(tmp_path):
     ("iso", "step", "field"), [(7.0, 1, "iso"), (0.0, 0, "step"), (0.0, 33, "step"), (0.0, 24, "step")]
 )
 def test_rejects_invalid_input(tmp_path, iso, step, field):
-    with pytest.raises(InvalidInput) as caught:
+    with pytest.raises(InvalidInput, match=f"^{field}: "):
         mesh_volume(balls(tmp_path, (11, 11, 11)), iso, step, tmp_path / "m.h5")
-    assert caught.value.field == field
     assert not (tmp_path / "m.h5").exists()
 
 

@@ -139,7 +139,6 @@ def test_the_tasks_are_those_of_the_graph(tmp_path):
 
 def test_too_little_memory_is_refused():
     small = WorkerCapacity(300 * MIB, ("recon", "render"))
-    with pytest.raises(InvalidInput, match="volume") as refusal:
+    with pytest.raises(InvalidInput, match=r"volume.*bytes"):
         plan_turntable((512, 512, 512), Turntable(), [small])
-    assert "bytes" in str(refusal.value)
     assert plan_turntable((512, 512, 512), Turntable(), ()).workers == 0

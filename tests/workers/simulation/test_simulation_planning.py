@@ -67,12 +67,10 @@ def test_every_emitter_is_in_one_part(elements, nodes, slices):
     ],
 )
 def test_rejects_grids_larger_than_worker_memory(asked, field):
-    with pytest.raises(InvalidInput) as caught:
+    with pytest.raises(InvalidInput, match=rf"^{field}: .*; accepted: .*bytes"):
         plan_simulation(
             asked, [WORKER, WorkerCapacity(64 * MIB, ("recon",)), WorkerCapacity(2**50, ("render",))]
         )
-    assert caught.value.field == field
-    assert "bytes" in caught.value.accepted
 
 
 def test_rejects_oversize_files_and_too_many_tasks(monkeypatch):

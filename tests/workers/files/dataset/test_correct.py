@@ -123,9 +123,8 @@ def test_each_statement_changes_its_fields_alone():
 
 def test_a_sampling_rate_below_the_pulse_is_refused_unless_it_is_stated():
     dataset = usual(delta_tof_s=1e-3 * small().delta_tof_s)
-    with pytest.raises(InvalidInput, match="state sampling_rate_hz if it was right") as caught:
+    with pytest.raises(InvalidInput, match=r"^sampling_rate_hz: .*state sampling_rate_hz if it was right"):
         corrected(dataset, Correction("ms", "us"), "ds-1")
-    assert caught.value.field == "sampling_rate_hz"
     made = corrected(dataset, Correction("ms", "us", sampling_rate_hz=1e7), "ds-1")
     assert made.sampling_rate_hz == 1e7
 
@@ -143,10 +142,8 @@ def test_a_sampling_rate_below_the_pulse_is_refused_unless_it_is_stated():
     ],
 )
 def test_wrong_corrections_name_their_field(stated, field, accepted):
-    with pytest.raises(InvalidInput) as caught:
+    with pytest.raises(InvalidInput, match=rf"^{field}: .*; accepted: .*{accepted}"):
         Correction(**stated)
-    assert caught.value.field == field
-    assert accepted in caught.value.accepted
 
 
 def test_an_implausible_scan_is_refused_and_nothing_is_written(tmp_path):
