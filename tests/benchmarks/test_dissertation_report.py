@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 def test_every_table_and_figure_of_chapters_3_to_7_is_listed():
     assert [chapter.number for chapter in CHAPTERS] == [3, 4, 5, 6, 7]
-    listed = [item.name for item in items()]
+    listed = [item.name for item in items() if item.name != "Future work"]
     assert sorted(listed, key=lambda name: (name[0], int(name.split()[1]))) == [
         *(f"Figure {number}" for number in range(1, 35)),
         *(f"Table {number}" for number in range(1, 9)),
