@@ -14,7 +14,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 # Tests and jobs start hundreds of Python processes, and each would compile all sources again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help install compiled install-dev install-tests install-docs demo test test-all serve lint tables docs bench bench-device mutants release lock clean
+.PHONY: help install compiled install-dev install-tests install-docs demo test test-all serve lint tables docs bench bench-device reproduce mutants release lock clean
 
 help: ## list the targets
 	@echo "Bentray: make TARGET"
@@ -55,6 +55,9 @@ docs: install-docs ## build the documentation into build/docs, with the gallery;
 bench: install ## run the benchmark NAME; NAME=reconstruction ARGS=--quick
 	@mkdir -p build/bench
 	@$(BIN)/bentray bench $(NAME) $(ARGS) --json build/bench/$(NAME).json --pictures build/bench
+
+reproduce: install ## measure every table and figure of chapters 3 to 7 of the dissertation into build/reproduce/report.html (about 90 minutes; continues a run that was ended); ARGS="--only chapter4"
+	@$(BIN)/bentray bench dissertation -o build/reproduce $(ARGS)
 
 bench-device: install ## measure each engine and whole reconstructions on the OpenCL device of this machine; ARGS=--quick on a processor
 	@mkdir -p build/bench
