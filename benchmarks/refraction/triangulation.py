@@ -22,9 +22,9 @@ from bentray_kernels.splines import Spline
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 
-from ..eikonal.eikonal import alternate
 from ..shared._available import available
-from ..shared._contact_sheet import Panel, sheet
+from ..shared._pictures import Panel, sheet
+from ..shared._timing import alternate
 from ._refracting_ball import (
     DISTANCE_RADIUS,
     INDEX,
@@ -126,7 +126,7 @@ def masked(compared: np.ndarray, ends: Floats) -> tuple[np.ndarray, Floats, floa
 def labels(case: Case, fineness: int) -> list[str]:
     """Of the rows of a triangulation."""
     quantities = ["time"] if case.truth is None else ["error", "time"]
-    return [f"{case.name}, mesh at {fineness}× sampling, {quantity} over direct" for quantity in quantities]
+    return [f"{case.name}, mesh at {fineness}x sampling, {quantity} over direct" for quantity in quantities]
 
 
 def compared(case: Case, marching_cubes: Callable[..., Any], repeats: int) -> tuple[list[Panel], list[Row]]:
@@ -154,7 +154,7 @@ def compared(case: Case, marching_cubes: Callable[..., Any], repeats: int) -> tu
     panels = [Panel(f"direct rays, {1e3 * seconds['direct']:.0f} ms", results["direct"].image)]
     made = []
     for k in built:
-        panels.append(Panel(f"mesh at {k}× sampling, {1e3 * seconds[k]:.0f} ms", results[k].image))
+        panels.append(Panel(f"mesh at {k}x sampling, {1e3 * seconds[k]:.0f} ms", results[k].image))
         lost = float((~(off[k][used] <= 1.0)).mean())
         detail = (
             f"{built[k]}; median distance of rays on the backdrop, nodes: mesh {error[k]:.2g}, direct "
