@@ -16,6 +16,7 @@ from bentray_kernels.meshes.surface import Surface, surface_of
 from bentray_kernels.refraction import Backdrop, Camera, Layers, RenderSettings, Scene, render
 from bentray_kernels.refraction.backdrop import locate
 from bentray_kernels.refraction.caster import REFRACTED
+from bentray_kernels.refraction.coarse_rays import Hits
 from bentray_kernels.refraction.optics import refracted
 from bentray_kernels.refraction.supersampling import point_colours
 from bentray_kernels.splines import Spline
@@ -206,8 +207,10 @@ def meshed(case: Case, mesh: Triangulation) -> Frame:
     locate(case.backdrop, start, ahead, plane, where)
     plane[lost], where[lost] = -1, np.nan
     image = np.empty((PIXELS, PIXELS, 3), dtype=np.uint8)
-    grid = plane.reshape(PIXELS, PIXELS), where.reshape(PIXELS, PIXELS, 2)
-    point_colours(case.backdrop, *grid, np.ones((PIXELS, PIXELS)), image)
+    shape = PIXELS, PIXELS
+    fate, crossed = np.zeros(shape, dtype=np.uint8), np.zeros(shape, dtype=np.int16)
+    hits = Hits(plane.reshape(shape), where.reshape(*shape, 2), fate, crossed, np.ones(shape))
+    point_colours(case.backdrop, hits, image)
     return Frame(image, where * case.backdrop.edges[plane])
 
 
