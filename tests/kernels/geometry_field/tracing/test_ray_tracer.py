@@ -18,6 +18,7 @@ from bentray_kernels.geometry_field.tracing.lookup_scene import UV_WAYS, WAYS
 from bentray_kernels.geometry_field.tracing.packed_scene import world_of
 from bentray_kernels.geometry_field.tracing.ray_tracer import TraceSettings, trace
 from bentray_kernels.geometry_field.tracing.scene import Ground, Instance, Material, Scene, Shape, placed
+from bentray_kernels.meshes.mesh import Chart, TriangleMesh
 from bentray_kernels.meshes.surface import surface_of
 from bentray_kernels.refraction import Camera, perspective
 
@@ -48,6 +49,18 @@ def striped(rows: int = 32) -> np.ndarray:
 def picture(scene: Scene, camera: Camera | None = None, **how) -> np.ndarray:
     camera = camera or perspective((0.3, -3.0, 0.9), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 45.0)
     return trace(world_of(scene), camera, TraceSettings(SIZE, SIZE, **how)).astype(int)
+
+
+def ball(
+    material: Material, shape: Shape | None = None, environment: np.ndarray | None = None, **how
+) -> Scene:
+    """One body in the middle, by default the round one among stripes."""
+    body = Instance(shape or round_shape(), placed((0.0, 0.0, 0.0), 1.0), material)
+    return Scene((body,), striped() if environment is None else environment, **how)
+
+
+# Out of sight.
+AWAY = Instance(round_shape(), placed((0.0, 0.0, 90.0), 1.0))
 
 
 def crowded(**how) -> Scene:
@@ -91,7 +104,7 @@ def test_depth_adds_what_further_surfaces_show():
 
 
 def test_a_mirror_ball_shows_what_lies_behind_the_eye():
-    scene = Scene((Instance(round_shape(), placed((0.0, 0.0, 0.0), 1.0), Material(mirror=1.0)),), striped())
+    scene = ball(Material(mirror=1.0))
     camera = perspective((0.0, -3.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 0.5)
     behind = perspective((0.0, -3.0, 0.0), (0.0, -6.0, 0.0), (0.0, 0.0, 1.0), 0.5)
     middle = picture(scene, camera)[SIZE // 2, SIZE // 2]
@@ -101,17 +114,14 @@ def test_a_mirror_ball_shows_what_lies_behind_the_eye():
 def test_a_glass_ball_turns_the_surroundings_upside_down():
     half = np.zeros((32, 64, 3))
     half[:16] = 1.0
-    shape = round_shape()
     camera = perspective((0.0, -3.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 20.0)
     for refraction, upright in (("full", False), ("single", False)):
-        material = Material(glass=1.0, refraction=refraction)
-        seen = picture(Scene((Instance(shape, placed((0.0, 0.0, 0.0), 1.0), material),), half), camera)
+        seen = picture(ball(Material(glass=1.0, refraction=refraction), environment=half), camera)
         column = seen[8:-8, SIZE // 2, 0]
         assert (column[0] > column[-1]) == upright
     # Of the index of its surroundings it is not seen.
-    material = Material(glass=1.0, index=1.0)
-    clear = picture(Scene((Instance(shape, placed((0.0, 0.0, 0.0), 1.0), material),), striped()), camera)
-    nothing = picture(Scene((Instance(shape, placed((0.0, 9.0, 90.0), 1.0), material),), striped()), camera)
+    clear = picture(ball(Material(glass=1.0, index=1.0)), camera)
+    nothing = picture(Scene((AWAY,), striped()), camera)
     assert np.abs(clear - nothing).max() <= 1
 
 
@@ -142,14 +152,11 @@ def test_total_internal_reflection():
         first = len(vertices)
         vertices += [corners[k] for k in quad]
         faces += [(first, first + 1, first + 2), (first, first + 2, first + 3)]
-    from bentray_kernels.meshes.mesh import Chart, TriangleMesh
-
     mesh = TriangleMesh(np.array(vertices), np.array(faces, dtype=np.int32))
     surface = surface_of(Chart(mesh, np.zeros((12, 3, 2))))
     sky = np.zeros((64, 128, 3))
     sky[:8] = 1.0
-    material = Material(glass=1.0, index=2.0)
-    scene = Scene((Instance(Shape(surface), placed((0.0, 0.0, 0.0), 1.0), material),), sky)
+    scene = ball(Material(glass=1.0, index=2.0), Shape(surface), sky)
     # In by the top, to a side, mirrored there, out by the floor: never the bright zenith.
     camera = perspective((0.35, -0.9, 2.0), (0.1, -0.2, 0.5), (0.0, 1.0, 0.0), 3.0)
     assert picture(scene, camera, depth=8).max() == 0
@@ -158,14 +165,13 @@ def test_total_internal_reflection():
 def test_self_reflection_only_on_request():
     seeing = Material(mirror=1.0)
     camera = perspective((0.2, -1.2, 2.2), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 35.0)
-
-    def of(shape: Shape, material: Material) -> np.ndarray:
-        instance = Instance(shape, placed((0.0, 0.0, 0.0), 1.0), material)
-        return picture(Scene((instance,), striped()), camera)
-
     blind = replace(seeing, self_reflection=False)
-    assert (of(round_shape(), seeing) == of(round_shape(), blind)).all()
-    assert np.mean((of(dented_shape(), seeing) != of(dented_shape(), blind)).any(axis=2)) > 0.005
+    round_off, dented_off = (
+        np.mean((picture(ball(seeing, shape), camera) != picture(ball(blind, shape), camera)).any(axis=2))
+        for shape in (round_shape(), dented_shape())
+    )
+    assert round_off == 0.0
+    assert dented_off > 0.005
 
 
 def test_moving_everything_alike_changes_nothing():
@@ -261,10 +267,6 @@ def published(material: Material, **reference) -> Scene:
     return Scene((Instance(shape, position, material),), striped(), ground)
 
 
-# Out of sight.
-AWAY = Instance(round_shape(), placed((0.0, 0.0, 90.0), 1.0))
-
-
 def test_published_lookups_make_nearly_the_exact_picture():
     scene = published(Material(colour=(0.9, 0.5, 0.3)))
     exact = picture(scene)
@@ -297,8 +299,7 @@ def test_published_lookups_read_the_image(way):
     mirror = Material(mirror=1.0)
     assert (picture(published(mirror), eye=way) != picture(published(mirror, image=moved), eye=way)).any()
     nowhere = picture(published(material, image=np.full_like(image, np.nan)), eye=way)
-    away = Instance(round_shape(), placed((0.0, 0.0, 90.0), 1.0))
-    np.testing.assert_array_equal(nowhere, picture(replace(published(material), instances=(away,))))
+    np.testing.assert_array_equal(nowhere, picture(replace(published(material), instances=(AWAY,))))
 
 
 @pytest.mark.parametrize("way", UV_WAYS)
@@ -357,10 +358,8 @@ def test_pictures_do_not_depend_on_threads_or_runs():
 
 def test_the_ground_is_a_checkerboard_of_metres():
     ground = Ground(-1.0, 0.5, 4.0, ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
-    far = Instance(round_shape(), placed((0.0, 0.0, 90.0), 1.0))
-    scene = Scene((far,), WHITE, ground)
     camera = perspective((0.0, 0.0, 4.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0), 90.0)
-    seen = picture(scene, camera)
+    seen = picture(Scene((AWAY,), WHITE, ground), camera)
     # Ten metres across and forty pixels: squares of two pixels, a disc of four metres.
     x = (np.arange(SIZE) + 0.5) / SIZE * 10.0 - 5.0
     odd = (np.floor(x[None, :] / 0.5) + np.floor(-x[:, None] / 0.5)) % 2 == 1
@@ -396,9 +395,9 @@ def test_rays_that_start_in_the_cube_of_another_body_see_it():
         ("radius_m", lambda: Ground(0.0, 1.0, np.inf)),
         ("height_m", lambda: Ground(np.nan, 1.0, 1.0)),
         ("instances", lambda: Scene((), WHITE)),
-        ("environment", lambda: Scene((Instance(round_shape(), np.eye(4)[:3]),), 300.0 * WHITE)),
-        ("light", lambda: Scene((Instance(round_shape(), np.eye(4)[:3]),), WHITE, light=(0.0, 0.0, 0.0))),
-        ("ambient", lambda: Scene((Instance(round_shape(), np.eye(4)[:3]),), WHITE, ambient=-1.0)),
+        ("environment", lambda: Scene((AWAY,), 300.0 * WHITE)),
+        ("light", lambda: Scene((AWAY,), WHITE, light=(0.0, 0.0, 0.0))),
+        ("ambient", lambda: Scene((AWAY,), WHITE, ambient=-1.0)),
         ("reference", lambda: Shape(round_shape().surface, reference=published_shape().reference)),
         ("reference", lambda: replace(wholly_published_shape(), inner=None)),
         ("depth", lambda: TraceSettings(depth=-1)),
