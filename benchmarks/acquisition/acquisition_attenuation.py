@@ -2,10 +2,9 @@
 
 from collections.abc import Iterable
 from dataclasses import replace
-from functools import partial
 
 from bentray_kernels.acquisition import Dataset, pick
-from bentray_kernels.tomography import Reconstruction, Settings, reconstruct
+from bentray_kernels.tomography import Settings
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import CONSTANTS, STRAIGHT_RAYS, Row
 from bentray_service.cli.output.terminal import Step
@@ -33,7 +32,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
     """NRMSE inside the object by FWI and by rays, relative to the true range; quick: only of a small scan."""
     for name, dataset in scans(context.quick, context.progress):
         picked = replace(pick(dataset), waveform=dataset.waveform)
-        images = Images(picked, partial(run, context.progress))
+        images = Images.here(picked, context.progress)
         error_on = object_attenuation_error(dataset)
         ways = {
             f"{rays} rays, {way}": Settings.from_values(method="sart", rays=rays, **changes)
@@ -66,8 +65,3 @@ def scans(quick: bool, progress: Step) -> Iterable[tuple[str, Dataset]]:
         yield name, lossy_scan(scan, progress, proportional=proportional)
     if not quick:
         yield from other_scan()
-
-
-def run(progress: Step, dataset: Dataset, settings: Settings) -> Reconstruction:
-    """A reconstruction in this process."""
-    return reconstruct(dataset, settings, lambda now: progress(now.done, now.total, settings.method))

@@ -11,7 +11,7 @@ from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.noise import with_noise
 from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
 from bentray_kernels.phantoms import TABLE7_SIDE_M, table7
-from bentray_kernels.tomography import Reconstruction, Settings, reconstruct
+from bentray_kernels.tomography import Reconstruction, Settings
 from bentray_service.cli.output.terminal import Step
 from bentray_workers.simulation.plane import SimulationSettings, ring_radius
 from bentray_workers.simulation.simulation_run import simulate
@@ -101,12 +101,7 @@ class PhantomScan:
     @cached_property
     def images(self) -> Images:
         """The images of this scan, each reconstructed once."""
-
-        def run(dataset: Dataset, settings: Settings) -> Reconstruction:
-            what = f"{settings.rays} {settings.method}"
-            return reconstruct(dataset, settings, lambda p: self.progress(p.done, p.total, what))
-
-        return Images(self.dataset, run)
+        return Images.here(self.dataset, self.progress)
 
     def run(self, what: str, **changes: object) -> ReconstructionError:
         """Reconstruct with some settings of SART on the grid of the phantom, and compare."""

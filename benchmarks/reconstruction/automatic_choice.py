@@ -4,7 +4,7 @@ import os
 from collections.abc import Iterable
 
 from bentray_kernels.acquisition import Dataset
-from bentray_kernels.tomography import Reconstruction, Settings, reconstruct
+from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography.model_selection.selection import explain_candidates
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
@@ -38,12 +38,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
 
 def choice_row(name: str, dataset: Dataset, error_on: ErrorOn, unit: str, context: BenchmarkContext) -> Row:
     """The error by default settings over that of the better image by SART."""
-
-    def run(scan: Dataset, settings: Settings) -> Reconstruction:
-        what = f"{name}, {settings.rays} {settings.method}"
-        return reconstruct(scan, settings, lambda now: context.progress(now.done, now.total, what))
-
-    images = Images(dataset, run, DEFAULT)
+    images = Images.here(dataset, context.progress, name, DEFAULT)
     default, seconds = images.default()
     sart = {rays: images.made(SART.changed(rays=rays)).result for rays in ("straight", "curved")}
     errors = {rays: error_on(image).of(image) for rays, image in sart.items()}

@@ -9,7 +9,7 @@ import numpy as np
 from bentray_kernels.acquisition import Dataset, pick
 from bentray_kernels.arrays import Floats
 from bentray_kernels.phantoms import TABLE7_SIDE_M, table7_slices
-from bentray_kernels.tomography import Reconstruction, Settings, reconstruct
+from bentray_kernels.tomography import Settings
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import DEFAULT_SETTINGS, STRAIGHT_RAYS, Row
 from bentray_workers.simulation.simulation_run import simulate
@@ -112,12 +112,7 @@ def summarised(
 def scanned(context: BenchmarkContext, asked: SliceWaves, dataset: Dataset) -> Scanned:
     """The images of a slice from its traces; all ways start from the same picks."""
     picked = replace(pick(dataset), waveform=dataset.waveform)
-
-    def run(of: Dataset, settings: Settings) -> Reconstruction:
-        what = f"{settings.rays} {settings.method}, z = {1e3 * asked.z_m:.0f} mm"
-        return reconstruct(of, settings, lambda p: context.progress(p.done, p.total, what))
-
-    images = Images(picked, run)
+    images = Images.here(picked, context.progress, f"z = {1e3 * asked.z_m:.0f} mm")
     results = {name: images.made(settings).result for name, settings in SETTINGS.items()}
     results[STRAIGHT_RAYS] = images.straight(results[DEFAULT_SETTINGS])
     speeds = {name: on_phantom_nodes(image, asked.coupling_mps) for name, image in results.items()}

@@ -67,7 +67,9 @@ def volume(nodes: int, slices: int, elements: int, distinct: int, context: Bench
     meet the goal, however fast it is.
     """
     with context.cluster() as cluster:
-        few = simulated(nodes, distinct, elements, cluster, context.progress)
+        asked = VolumeSimulationSettings(nodes, distinct, elements, COUPLING_MPS)
+        what = f"simulating {distinct} slices of {nodes}²"
+        few = simulate(asked, lambda now: context.progress(now.done, now.total, what), cluster.client)
         many = repeated(few, nodes, slices)
         seconds, made = {}, {}
         images = Images(
@@ -99,16 +101,6 @@ def volume(nodes: int, slices: int, elements: int, distinct: int, context: Bench
         detail = f"{THEIRS[nodes, slices]}; {detail}"
     label = f"R5 {nodes}² by {slices}, {elements} transducers"
     yield compared.row(label, seconds["curved"], goal, "<=", "s", detail)
-
-
-def simulated(nodes: int, distinct: int, elements: int, cluster: Cluster, progress: Step) -> Dataset:
-    """A scan of a few slices."""
-    asked = VolumeSimulationSettings(nodes, distinct, elements, COUPLING_MPS)
-    return simulate(
-        asked,
-        lambda p: progress(p.done, p.total, f"simulating {distinct} slices of {nodes}²"),
-        cluster.client,
-    )
 
 
 def repeated(few: Dataset, nodes: int, slices: int) -> Dataset:

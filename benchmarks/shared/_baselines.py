@@ -1,12 +1,14 @@
 """Baselines of an image error: best constant, water alone, straight rays likewise, and default settings."""
 
+from __future__ import annotations
+
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
 from bentray_kernels.acquisition import Dataset
-from bentray_kernels.tomography import Reconstruction, Settings
+from bentray_kernels.tomography import Reconstruction, Settings, reconstruct
 from bentray_service.cli.output.benchmark_row import (
     BEST_CONSTANT,
     DEFAULT_SETTINGS,
@@ -14,6 +16,7 @@ from bentray_service.cli.output.benchmark_row import (
     WATER_ALONE,
     Row,
 )
+from bentray_service.cli.output.terminal import Step
 
 from ._image_error import ErrorOn
 
@@ -59,6 +62,18 @@ class Images:
         self._run = run
         self._default = default or Settings()
         self._made: dict[Settings, Image] = {}
+
+    @classmethod
+    def here(
+        cls, dataset: Dataset, progress: Step, name: str = "", default: Settings | None = None
+    ) -> Images:
+        """Images that are made in this process; the progress names the method and the scan."""
+
+        def run(scan: Dataset, settings: Settings) -> Reconstruction:
+            what = f"{settings.rays} {settings.method}{name and ', '}{name}"
+            return reconstruct(scan, settings, lambda now: progress(now.done, now.total, what))
+
+        return cls(dataset, run, default)
 
     def made(self, settings: Settings) -> Image:
         """The image by some settings."""
