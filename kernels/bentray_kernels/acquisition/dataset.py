@@ -192,7 +192,8 @@ class Dataset:
         if self.element_normal is not None:
             rules.shape("geometry/element_normal", self.element_normal, self.element_position_m.shape)
             rules.finite("geometry/element_normal", self.element_normal)
-        rules.positive("geometry@radius_m", self.radius_m, "m")
+        if self.radius_m is not None and not 0.0 < self.radius_m < np.inf:
+            raise InvalidInput("geometry@radius_m", self.radius_m, "a finite number > 0 m")
         for path, array, axis in (
             ("acquisition/wavelet", self.wavelet, "nt"),
             ("slice/z_m", self.slice_z_m, "nz"),

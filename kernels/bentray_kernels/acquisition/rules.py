@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -52,12 +51,6 @@ def within_or_nan(name: str, array: NDArray[Any], within: Range) -> None:
     if within.above:
         wrong |= array == within.least
     _refuse(name, array, wrong, f"{within.words}, NaN for missing ones")
-
-
-def positive(name: str, value: float | None, unit: str) -> None:
-    """A number above zero, where one is given."""
-    if value is not None and not 0.0 < value < math.inf:
-        raise InvalidInput(name, value, f"a finite number > 0 {unit}")
 
 
 def _refuse(name: str, array: NDArray[Any], wrong: NDArray[np.bool_], accepted: str) -> None:

@@ -15,7 +15,6 @@ from .gauss_newton import gauss_newton_step
 from .reconstruction_graph import ReconstructionCheckpoint
 from .result import Iteration
 from .sart import sart_step
-from .sart.block_checkpoint import BlockCheckpoint
 from .uncertainty.ray_uncertainty import Uncertainty
 
 # Records in checkpoints of a reconstruction, by name; ``waveform`` adds its own.
@@ -25,7 +24,7 @@ TYPES: Mapping[str, type] = MappingProxyType(
         for kind in (
             ReconstructionCheckpoint,
             sart_step.State,
-            BlockCheckpoint,
+            sart_step.BlockCheckpoint,
             gauss_newton_step.Iterate,
             gauss_newton_step.Measured,
             Iteration,

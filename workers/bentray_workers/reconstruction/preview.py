@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from bentray_kernels.arrays import Floats
 from bentray_kernels.tomography.checkpoint import unpack
 from bentray_kernels.tomography.reconstruction_graph import ReconstructionCheckpoint
-from bentray_kernels.tomography.sart.block_checkpoint import BlockCheckpoint
+from bentray_kernels.tomography.sart.sart_step import BlockCheckpoint
 from bentray_kernels.tomography.waveform.inversion_state import RefinementCheckpoint
 from bentray_kernels.tomography.waveform.waveform_checkpoint import TYPES
 

@@ -8,7 +8,20 @@ import numpy as np
 
 from ...compilation.compiled import kernel
 from .onset import FAINTEST, Trace
-from .peak_interpolation import crest
+
+
+@kernel(inline="always")
+def crest(left: float, middle: float, right: float) -> tuple[float, float]:
+    """Position and height of the maximum of the cosine through (−1, left), (0, middle), (1, right).
+
+    The autocorrelation of a pulse is a cosine near its maximum; with few samples per period a parabola
+    underestimates the height.
+    """
+    turn = math.acos(min(max((left + right) / (2.0 * middle), -1.0), 1.0))
+    if turn < 1e-9:
+        return 0.0, middle
+    phase = math.atan2(right - left, 2.0 * middle * math.sin(turn))
+    return phase / turn, middle / math.cos(phase)
 
 
 @kernel

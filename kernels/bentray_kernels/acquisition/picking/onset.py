@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compilation.compiled import kernel
-from .peak_interpolation import vertex
 
 Trace = NDArray[Any]
 
@@ -72,6 +71,13 @@ def first_strong(x: Trace, begin: int, end: int, period: float, noise: float) ->
         if abs(x[i]) > abs(x[best]):
             best = i
     return best
+
+
+@kernel(inline="always")
+def vertex(left: float, middle: float, right: float) -> float:
+    """Position of the extremum of the parabola through (−1, left), (0, middle), (1, right)."""
+    bend = left - 2.0 * middle + right
+    return 0.5 * (left - right) / bend if bend != 0.0 and math.isfinite(bend) else 0.0
 
 
 @kernel

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -38,6 +39,32 @@ class State:
     residuals: Ints = field(default_factory=lambda: residual_counts(np.empty(0)))
     done: bool = False
     history: tuple[Iteration, ...] = ()
+
+
+@dataclass(frozen=True)
+class BlockCheckpoint:
+    """State of SART in blocks, whose images are in files; see ``task_graph.Checkpoint``.
+
+    Attributes:
+        state: of SART, with empty images: those are in files.
+        updates: made so far; the number of the files.
+        blocks: number of blocks.
+        nodes: along x.
+        spacing: of the nodes, m.
+        origin: position of node 0, m.
+    """
+
+    state: State
+    updates: int
+    blocks: int
+    nodes: int
+    spacing: float
+    origin: tuple[float, ...]
+
+    @property
+    def milestone(self) -> tuple[Any, ...]:
+        # Each update: its files replace those of the update before the last.
+        return (self.updates,)
 
 
 def begin(slowness: Floats) -> State:

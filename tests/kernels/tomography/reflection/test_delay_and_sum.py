@@ -9,7 +9,7 @@ from bentray_kernels.tomography.reflection.delay_and_sum import Pixels, Signals,
 from bentray_kernels.tomography.reflection.delay_and_sum_opencl import sum_echoes_opencl
 from bentray_kernels.tomography.reflection.echoes import analytic
 from bentray_kernels.tomography.reflection.element_times import solve_times
-from bentray_kernels.tomography.reflection.reflection_image import envelope_of
+from bentray_kernels.tomography.reflection.with_reflection import envelope_of
 
 from .point_echoes import RATE_HZ, T0, WATER, ring, traces
 

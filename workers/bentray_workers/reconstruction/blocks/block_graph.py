@@ -14,8 +14,7 @@ from bentray_kernels.eikonal.problem import cell_of, placed, straight_times
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.task_graph import Task
 from bentray_kernels.tomography.result import Iteration, residual_counts
-from bentray_kernels.tomography.sart.block_checkpoint import BlockCheckpoint
-from bentray_kernels.tomography.sart.sart_step import State, advanced, batch_of, begin
+from bentray_kernels.tomography.sart.sart_step import BlockCheckpoint, State, advanced, batch_of, begin
 from bentray_kernels.tomography.sart.sart_update import valid_receivers
 from bentray_kernels.tomography.scan import Scan
 from bentray_kernels.tomography.solver_choice import undivided_reason
