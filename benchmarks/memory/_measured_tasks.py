@@ -1,8 +1,9 @@
-"""Jobs of all kinds whose memory is measured in workers; each returns the plan of its tasks."""
+"""Jobs of all kinds whose memory is measured in workers; each returns the planned sizes of its tasks."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import tomllib
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,14 +13,14 @@ from distributed import Client
 
 from bentray_kernels.meshes.example_surfaces import sphere
 from bentray_kernels.tomography import Settings
+from bentray_workers.cluster.task_costs import TaskSize
 from bentray_workers.files.dataset.scan import counts_in
-from bentray_workers.files.export.registry import EXPORTED
 from bentray_workers.files.geometry_field_folder import FieldFiles, read_json
 from bentray_workers.files.mesh import StoredMesh, write_mesh
 from bentray_workers.files.volume import Volume, write_volume
 from bentray_workers.files.volume_export import export_volume
 from bentray_workers.images.drawing_tasks import volume_slice_png
-from bentray_workers.reconstruction.planning import plan
+from bentray_workers.reconstruction.planning import plan, task_sizes
 from bentray_workers.reconstruction.quality_report import quality_page
 from bentray_workers.reconstruction.reconstruction_run import reconstruct
 from bentray_workers.reconstruction.scan_views import emission_traces, scan_geometry
@@ -30,15 +31,19 @@ from bentray_workers.rendering.field_view import FieldView
 from bentray_workers.rendering.geometry_field import build_field
 from bentray_workers.rendering.histogram import volume_histogram
 from bentray_workers.rendering.isosurface_mesh import mesh_volume
-from bentray_workers.rendering.picture_cost import VolumeFile
+from bentray_workers.rendering.picture_cost import Cost, VolumeFile
 from bentray_workers.rendering.refraction_view import RefractionView
+from bentray_workers.simulation.cost import task_sizes as simulated_sizes
 from bentray_workers.simulation.request import PhantomScan
-from bentray_workers.simulation.simulation_planning import plan_simulation
 from bentray_workers.simulation.simulation_run import simulate_to_file
 
 from ..shared._synthetic_scan import made_up_scan, made_up_traces
 
-Bytes = dict[str, int]
+Plan = Mapping[str, TaskSize | Cost]
+
+# Runs a job with the client of a worker in a folder; returns the plans of its tasks by name, or that of a
+# picture.
+Run = Callable[[Client, Path], Plan]
 
 
 class Job(NamedTuple):
@@ -46,62 +51,73 @@ class Job(NamedTuple):
 
     Attributes:
         name: of its kind.
-        run: takes the client of a worker, a folder and a size; returns the planned bytes by task.
-        size: further arguments of ``run``.
-        warm: a small size, which loads libraries and compiled code: plans are above a warm worker.
+        size: in ``jobs.toml``.
+        run: the job.
+        warm: small ones, which load libraries and compiled code: plans are above a warm worker.
     """
 
     name: str
-    run: Callable[..., Bytes]
     size: tuple[Any, ...]
-    warm: tuple[Any, ...]
+    run: Run
+    warm: tuple[Run, ...]
 
     def __str__(self) -> str:
         return f"{self.name}, {' x '.join(str(part) for part in self.size)}"
 
 
-def by_times(asked: dict[str, Any], client: Client, folder: Path, *size: float) -> Bytes:
+def by_times(_kind: str, asked: dict[str, Any], client: Client, folder: Path, *size: Any) -> Plan:
     """Reconstruct from travel times; the size is of elements, emitters, nodes, slices and their pitch, m."""
-    elements, emitters, nodes, slices, pitch_m = size
+    elements, emitters, nodes, slices, pitch_m = (*size, *(1, 0.003)[len(size) - 3 :])
     path = folder / "times.h5"
-    losses = "attenuation" in asked
-    made_up_scan(path, int(elements), int(slices), int(emitters), pitch_m, losses=losses)
-    return _reconstructed(client, path, {"nodes": nodes, "iterations": 2, **asked})
+    if not path.exists():
+        made_up_scan(path, elements, slices, emitters, pitch_m, losses=asked["attenuation"])
+    return _reconstructed(client, path, {"nodes": nodes, **asked})
 
 
-def by_traces(asked: dict[str, Any], client: Client, folder: Path, elements: int, samples: int) -> Bytes:
+def by_traces(
+    _kind: str, asked: dict[str, Any], client: Client, folder: Path, elements: int, samples: int
+) -> Plan:
     """Pick times of traces, and reconstruct."""
-    centre_hz = 2.5e5 if asked.get("method") == "waveform" else 1e6
-    path = made_up_traces(folder / "traces.h5", elements, samples, centre_hz)
-    return _reconstructed(client, path, {"nodes": 48, "iterations": 2, **asked})
+    settings = {"nodes": 48, **asked}
+    kind = {name: settings.pop(name) for name in ("water", "real") if name in settings}
+    centre_hz = settings.pop("centre_hz", 2.5e5 if asked.get("method") == "waveform" else 1e6)
+    path = folder / "traces.h5"
+    if not path.exists():
+        made_up_traces(path, elements, samples, centre_hz, **kind)
+    return _reconstructed(client, path, settings)
 
 
-def _reconstructed(client: Client, path: Path, asked: dict[str, Any]) -> Bytes:
-    settings = Settings.from_values(**{"method": "sart", "decomposition": "slices", **asked})
+def _reconstructed(client: Client, path: Path, asked: dict[str, Any]) -> Plan:
+    usual = {"method": "sart", "decomposition": "slices", "iterations": 2, "uncertainty": False}
+    settings = Settings.from_values(**{**usual, **asked})
     reconstruct(client, path, settings)
-    return dict(plan(counts_in(path).summary(settings), settings, ()).call_bytes)
+    scan = counts_in(path).summary(settings)
+    fitted, planned = task_sizes(scan, settings), plan(scan, settings, ()).call_bytes
+    return {name: fitted.get(name, Cost(0.0, size)) for name, size in planned.items()}
 
 
-def by_phantom(asked: dict[str, Any], client: Client, folder: Path, size: dict[str, Any]) -> Bytes:
+def by_phantom(_kind: str, asked: dict[str, Any], client: Client, folder: Path) -> Plan:
     """Simulate a scan."""
-    request = PhantomScan(**asked, **size)
-    simulate_to_file(client, request.chosen(), folder / "scan.h5")
-    return dict(plan_simulation(request, ()).call_bytes)
+    settings = PhantomScan(**asked).chosen()
+    simulate_to_file(client, settings, folder / "scan.h5")
+    return simulated_sizes(settings)
 
 
-def by_volume(name: str, client: Client, folder: Path, nodes: int, pixels: int = 400) -> Bytes:
-    """Draw or export an uploaded volume of nodes³ float32."""
+def by_volume(
+    kind: str, style: dict[str, Any], client: Client, folder: Path, nodes: int, pixels: int = 400
+) -> Plan:
+    """Draw or export an uploaded volume of nodes³ float32; ``style`` is that of a slice."""
     x = np.linspace(-1.0, 1.0, nodes, dtype=np.float32) ** 2
     path, shape = folder / f"{nodes}.h5", (nodes,) * 3
     write_volume(path, Volume.from_values(x[:, None, None] + x[:, None] + x, (1e-3,) * 3))
     stored = VolumeFile.from_row({"shape": shape, "bytes": 4 * nodes**3})
     view = RefractionView(iso=(0.9,), width=pixels, height=pixels)
-    if name == "refraction":
+    if kind == "refraction":
         tiles.submit(client, refraction.tasks_of(path, view), 0).result()
-        return {name: picture_cost.refraction_bytes(shape, view)}
-    written: dict[str, Any] = {"target": folder / "exported", "name": name}
+        return {kind: Cost(0.0, picture_cost.refraction_bytes(shape, view))}
+    written: dict[str, Any] = {"target": folder / "exported", "name": kind}
     task, options, cost = {
-        "slice": (volume_slice_png, {"size": pixels}, partial(picture_cost.slice_cost, size=pixels)),
+        "slice": (volume_slice_png, {**style, "size": pixels}, partial(picture_cost.slice_cost, size=pixels)),
         "histogram": (volume_histogram, {"quantity": "value", "bins": 256}, picture_cost.filter_cost),
         "coefficients": (coefficients_npy, {"view": RefractionView()}, picture_cost.filter_cost),
         "mesh": (
@@ -109,12 +125,14 @@ def by_volume(name: str, client: Client, folder: Path, nodes: int, pixels: int =
             {"iso": None, "step": 8, "target": folder / "mesh"},
             partial(picture_cost.mesh_cost, step=8),
         ),
-    }.get(name, (export_volume, written, partial(picture_cost.export_cost, name=name)))
+    }.get(kind, (export_volume, written, partial(picture_cost.export_cost, name=kind)))
     _call(client, task, path, **options)
-    return {name: cost(stored).bytes}
+    return {kind: cost(stored)}
 
 
-def by_field(client: Client, folder: Path, samples: int, image: int, pixels: int) -> Bytes:
+def by_field(
+    _kind: str, _asked: dict[str, Any], client: Client, folder: Path, samples: int, image: int, pixels: int
+) -> Plan:
     """Draw a geometry field and its map; the size is of samples, and of pixels of image and picture."""
     mesh, target = folder / "mesh.h5", folder / f"field {samples} {image}"
     (folder / "work").mkdir(exist_ok=True)
@@ -125,13 +143,12 @@ def by_field(client: Client, folder: Path, samples: int, image: int, pixels: int
     figures, view = read_json(FieldFiles(target).figures), FieldView(width=pixels, height=pixels)
     _call(client, field_picture.map_png, target, "positions")
     tiles.submit(client, field_picture.tasks_of(target, view), 0).result()
-    return {
-        "map": picture_cost.map_cost(figures).bytes,
-        "field": picture_cost.field_cost(figures, view).bytes,
-    }
+    return {"map": picture_cost.map_cost(figures), "field": picture_cost.field_cost(figures, view)}
 
 
-def by_scan(name: str, client: Client, folder: Path, elements: int, samples: int) -> Bytes:
+def by_scan(
+    kind: str, _asked: dict[str, Any], client: Client, folder: Path, elements: int, samples: int
+) -> Plan:
     """Show a scan with traces."""
     path = made_up_traces(folder / f"{elements}.h5", elements, samples, 1e6)
     row = {
@@ -149,87 +166,34 @@ def by_scan(name: str, client: Client, folder: Path, elements: int, samples: int
             {"emission": 3, "index": 0, "what": "object"},
             picture_cost.emission_cost,
         ),
-    }[name]
+    }[kind]
     _call(client, task, path, **options)
-    return {name: cost(row).bytes}
+    return {kind: cost(row)}
 
 
 def _call(client: Client, task: Callable[..., Any], *arguments: Any, **options: Any) -> None:
     client.submit(task, *arguments, **options, pure=False).result()
 
 
-PLANAR, DEEP = {"attenuation": False}, {"attenuation": False, "decomposition": "volume"}
-STRAIGHT, NEWTON = {"rays": "straight"}, {"method": "gauss-newton"}
-MAPS = {"attenuation": True, "resolution_check": True, "uncertainty": True}
-# Elements, emitters, nodes, slices, pitch; a pitch of a radius gives half as many heights as nodes.
-TIMES: dict[str, tuple[dict[str, Any], tuple[tuple[float, ...], ...]]] = {
-    "sart": (PLANAR, ((384, 0, 256, 1, 0), (256, 16, 512, 3, 0.003), (64, 2, 2048, 1, 0))),
-    "sart straight": (PLANAR | STRAIGHT, ((1024, 32, 128, 1, 0), (64, 8, 1024, 1, 0))),
-    "gauss-newton": (PLANAR | NEWTON, ((128, 64, 160, 1, 0), (256, 32, 128, 4, 0.003))),
-    "gauss-newton straight": (
-        PLANAR | NEWTON | STRAIGHT,
-        ((512, 128, 192, 1, 0), (256, 64, 128, 6, 0.003), (64, 8, 2048, 1, 0)),
-    ),
-    "maps straight": (MAPS | STRAIGHT, ((128, 64, 96, 1, 0), (256, 64, 160, 1, 0))),
-    "maps straight, gauss-newton": (MAPS | STRAIGHT | NEWTON, ((192, 64, 128, 1, 0),)),
-    "volume, sart": (DEEP, ((16, 2, 96, 2, 0.08), (8, 1, 200, 2, 0.08))),
-    "volume, sart straight": (DEEP | STRAIGHT, ((32, 4, 160, 2, 0.08), (16, 2, 256, 2, 0.08))),
-    "volume, gauss-newton": (DEEP | NEWTON, ((32, 8, 64, 4, 0.02), (16, 2, 128, 2, 0.08))),
-    "volume, gauss-newton straight": (
-        DEEP | NEWTON | STRAIGHT,
-        ((128, 64, 64, 6, 0.01), (32, 4, 128, 2, 0.08), (16, 2, 200, 2, 0.08)),
-    ),
-    "volume in 3 blocks": (DEEP | {"blocks": 3, "iterations": 1}, ((8, 1, 128, 2, 0.08),)),
-    "volume in 3 blocks, straight": (
-        DEEP | STRAIGHT | {"blocks": 3, "iterations": 1},
-        ((16, 2, 128, 2, 0.08), (16, 2, 240, 2, 0.08)),
-    ),
-}
-# Elements and samples.
-TRACES: dict[str, tuple[dict[str, Any], tuple[tuple[int, int], ...]]] = {
-    "picking": (PLANAR, ((48, 6000), (128, 2400))),
-    "picking, matched": (PLANAR | {"picker": "matched"}, ((64, 3000), (48, 12_000))),
-    "reflection": (PLANAR | {"reflection": True}, ((64, 1500), (48, 6000))),
-    "waveform": (PLANAR | {"method": "waveform", "bands": 1, "emitters": 8}, ((48, 260), (96, 300))),
-}
-PHANTOMS: dict[str, tuple[dict[str, Any], tuple[dict[str, Any], ...]]] = {
-    "simulation": ({"elements": 4}, ({"nodes": 400}, {"nodes": 800})),
-    "simulation in space": (
-        {"phantom": "table7", "three_d": True, "refinement": 2, "slices": 2, "elements": 4},
-        ({"nodes": 64}, {"nodes": 128}),
-    ),
-    "simulation of waves": ({"waveform": True, "emissions": 1, "elements": 64}, ({"frequency_hz": 3e5},)),
-}
-# Nodes, and pixels.
-VOLUMES: dict[str, tuple[tuple[int, ...], ...]] = {
-    "slice": ((200,), (24, 3000)),
-    "refraction": ((100,), (220,), (24, 3000)),
-    **dict.fromkeys(("histogram", "coefficients", "mesh"), ((100,), (260,))),
-    **dict.fromkeys(EXPORTED, ((260,),)),
-}
+RUNS = (by_times, by_traces, by_phantom, by_volume, by_field, by_scan)
+
+
+def _run_of(name: str, kind: dict[str, Any], size: list[Any]) -> Run:
+    asked = dict(kind["asked"])
+    for settings in size:
+        asked |= settings if isinstance(settings, dict) else {}
+    numbers = [part for part in size if not isinstance(part, dict)]
+    run: Callable[..., Plan] = next(run for run in RUNS if run.__name__ == f"by_{kind['run']}")
+    return lambda client, folder: run(name, asked, client, folder, *numbers)
+
+
+KINDS = tomllib.loads(Path(__file__).with_name("jobs.toml").read_text(encoding="utf-8"))
+FITTED, JUDGED = (
+    tuple(
+        Job(name, tuple(size), _run_of(name, kind, size), tuple(_run_of(name, kind, w) for w in kind["warm"]))
+        for name, kind in KINDS.items()
+        for size in kind[sizes]
+    )
+    for sizes in ("fitted", "judged")
+)
 QUICK = ("sart", "slice")
-
-
-def jobs() -> Iterator[Job]:
-    """All sizes of all kinds."""
-    for name, (asked, sizes) in TIMES.items():
-        small = (16, 4, 24, 2 if "volume" in name else 1, 0.08)
-        for size in sizes:
-            yield Job(name, partial(by_times, asked), size, small)
-    for name, (asked, sizes) in TRACES.items():
-        for size in sizes:
-            yield Job(name, partial(by_traces, asked), size, (16, 260 if name == "waveform" else 700))
-    for name, (asked, phantoms) in PHANTOMS.items():
-        for phantom in phantoms:
-            small_phantom = {"frequency_hz": 5e4} if "waves" in name else {"nodes": 16}
-            yield Job(name, partial(by_phantom, asked), (phantom,), (small_phantom,))
-    for name, shapes in VOLUMES.items():
-        for shape in shapes:
-            yield Job(name, partial(by_volume, name), shape, (16,))
-    for field in ((6, 65, 64), (16, 257, 64), (6, 513, 3000)):
-        yield Job("geometry field", by_field, field, (6, 33, 16))
-    for name in ("quality", "geometry", "emission"):
-        yield Job(name, partial(by_scan, name), (96, 3000), (16, 700))
-
-
-JOBS = tuple(jobs())

@@ -48,12 +48,23 @@ def made_up_scan(
     return path
 
 
-def made_up_traces(path: Path, elements: int, samples: int, centre_hz: float) -> Path:
-    """Pulses through water, as object and as water, with noise; 8 samples a cycle."""
+def made_up_traces(
+    path: Path, elements: int, samples: int, centre_hz: float, *, water: bool = True, real: bool = False
+) -> Path:
+    """Pulses through water, as object and as water, with noise; 8 samples a cycle.
+
+    Args:
+        path: of the file.
+        elements: of the ring; all emit and receive.
+        samples: of each trace.
+        centre_hz: of the pulse.
+        water: whether the water alone is recorded too.
+        real: stored as float32, not int16.
+    """
     ring, every = Ring(elements, 0.05).positions(), np.arange(elements)
     time = np.arange(samples) / (8.0 * centre_hz) - 4.0 / centre_hz
     random = np.random.default_rng(0)
-    traces = np.empty((elements, elements, samples), np.int16)
+    traces = np.empty((elements, elements, samples), np.float32 if real else np.int16)
     for emitter in every:
         length = np.linalg.norm(ring - ring[emitter], axis=1)[:, None]
         late = centre_hz * (time - length / WATER_MPS)
@@ -64,7 +75,7 @@ def made_up_traces(path: Path, elements: int, samples: int, centre_hz: float) ->
         every,
         every,
         WATER_MPS,
-        waveform=Waveform(traces, traces),
+        waveform=Waveform(traces, traces if water else None),
         center_frequency_hz=centre_hz,
         sampling_rate_hz=8.0 * centre_hz,
         t0_s=-4.0 / centre_hz,

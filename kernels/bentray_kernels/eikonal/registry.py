@@ -38,7 +38,6 @@ class Method:
         differences: order of the finite differences.
         factored: whether the source's singularity is factored out.
         batched: whether it solves several problems in a call.
-        swept_grids: grids of ``diagonals.Diagonals`` that a solve takes, in two and in three dimensions.
         on_device: whether it parallelises a batch itself; threads must not share it.
     """
 
@@ -48,7 +47,6 @@ class Method:
     differences: int
     factored: bool
     batched: bool = False
-    swept_grids: tuple[int, int] = (0, 0)
     on_device: bool = False
 
     def options(self) -> tuple[str, ...]:
@@ -69,12 +67,11 @@ class Method:
 FIRST, PLAIN, FACTORED = (1, 1, False), (1, 2, False), (2, 2, True)
 
 _METHODS = (
-    # Two of times and crossings, and the mask of known nodes or a copy for each order.
-    Method("accurate", accurate, *FACTORED, swept_grids=(5, 5)),
+    Method("accurate", accurate, *FACTORED),
     Method("fmm", fast_marching, *PLAIN),
     Method("hafmm", high_accuracy_fast_marching, *FACTORED),
-    Method("fsm", fast_sweeping, *FIRST, batched=True, swept_grids=(5, 5)),
-    Method("fsm-simultaneous", simultaneous_sweeps, *FIRST, swept_grids=(8, 12)),
+    Method("fsm", fast_sweeping, *FIRST, batched=True),
+    Method("fsm-simultaneous", simultaneous_sweeps, *FIRST),
     Method("fim", fast_iterative, *FIRST),
     Method("fim-opencl", fast_iterative_opencl, *FIRST, batched=True, on_device=True),
     Method("fmm-untidy", fast_marching_untidy, *PLAIN),

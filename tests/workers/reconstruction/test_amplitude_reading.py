@@ -11,8 +11,7 @@ from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography import reconstruct as reconstruct_here
 from bentray_workers.files.dataset import write_dataset
 from bentray_workers.files.dataset.scan import counts_in
-from bentray_workers.reconstruction import reconstruction_run
-from bentray_workers.reconstruction.memory import picking_memory
+from bentray_workers.reconstruction import reconstruction_run, trace_sizes
 
 from ...kernels.acquisition.traces import FREQUENCY_HZ, RATE_HZ, absorbed, blob_delay, scan
 
@@ -29,7 +28,7 @@ def lossy():
 
 
 def test_jobs_read_the_same_amplitudes_as_in_memory(lossy, tmp_path, monkeypatch):
-    monkeypatch.setattr(picking_memory, "TASK_SAMPLES", 30_000)
+    monkeypatch.setattr(trace_sizes, "TASK_SAMPLES", 30_000)
     plan = PLAN.changed(amplitudes="spectrum")
     picked = replace(pick(lossy), waveform=lossy.waveform)
     expected = reconstruct_here(picked, plan)

@@ -19,9 +19,8 @@ from bentray_kernels.wave import time_blocks
 from bentray_workers.cluster.job_cancellation import JobEnded
 from bentray_workers.files.dataset import read_dataset, write_dataset
 from bentray_workers.files.picking_files import ScanFindings, read_findings, write_findings
-from bentray_workers.reconstruction import reconstruction_run
+from bentray_workers.reconstruction import reconstruction_run, trace_sizes
 from bentray_workers.reconstruction.file_scan import FileSource
-from bentray_workers.reconstruction.memory import picking_memory
 from bentray_workers.reconstruction.picking_graph import (
     PICKED,
     PickingFiles,
@@ -79,7 +78,8 @@ def arrived(dataset, folder, picker="aic", *, examined=True):
     path = folder / "scan.h5"
     write_dataset(path, dataset)
     files = PickingFiles.in_folder(folder)
-    graph = PickingGraph(PickingSource(path, path.stat().st_mtime_ns, folder, picker, examined), files)
+    settings = Settings.from_values(method="sart", picker=picker, examine=examined)
+    graph = PickingGraph(PickingSource(path, path.stat().st_mtime_ns, folder, settings), files)
     run({"picking": graph}, ThreadPool())
     found = read_findings(files.findings)
     return read_dataset(files.picked if found.changed else path), found
@@ -96,13 +96,13 @@ def assert_same(one, other):
 @pytest.mark.parametrize("samples", [30_000, 10**9])
 @pytest.mark.parametrize("picker", PICKERS)
 def test_batches_equal_the_whole(tmp_path, monkeypatch, picker, samples):
-    monkeypatch.setattr(picking_memory, "TASK_SAMPLES", samples)
+    monkeypatch.setattr(trace_sizes, "TASK_SAMPLES", samples)
     assert_same(arrived(clean(), tmp_path, picker, examined=False)[0], pick(clean(), picker))
 
 
 @pytest.mark.parametrize("whole", [True, False])
 def test_faults_are_found_and_corrected_as_in_one_piece(tmp_path, monkeypatch, whole):
-    monkeypatch.setattr(picking_memory, "TASK_SAMPLES", 10**9 if whole else 30_000)
+    monkeypatch.setattr(trace_sizes, "TASK_SAMPLES", 10**9 if whole else 30_000)
     both = stacked(clean(), spoilt(clean(), damaged))
     expected = examine(both)
     picked, found = arrived(both, tmp_path)
@@ -135,7 +135,7 @@ def test_a_clean_scan_gives_the_image_that_it_gave_unexamined(tmp_path):
 
 
 def test_progress_counts_examined_and_picked_emissions(tmp_path, monkeypatch):
-    monkeypatch.setattr(picking_memory, "TASK_SAMPLES", 50_000)
+    monkeypatch.setattr(trace_sizes, "TASK_SAMPLES", 50_000)
     write_dataset(tmp_path / "scan.h5", clean())
     told = []
     reconstruction_run.reconstruct(None, tmp_path / "scan.h5", PLAN, told.append)
@@ -154,7 +154,9 @@ def test_calls_end_with_their_emission_once_the_job_has(tmp_path):
     path, folder = tmp_path / "scan.h5", tmp_path / "job"
     write_dataset(path, clean())
     folder.mkdir()
-    source = PickingSource(path, path.stat().st_mtime_ns, folder, "aic", True)
+    source = PickingSource(
+        path, path.stat().st_mtime_ns, folder, Settings.from_values(method="sart", picker="aic")
+    )
     with source.slice(0) as one:
         assert one.waveform.object[0].any()
         folder.rmdir()

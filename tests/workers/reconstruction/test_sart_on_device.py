@@ -10,7 +10,7 @@ from bentray_kernels.tomography import Settings, stage_graphs
 from bentray_kernels.tomography import reconstruct as reconstruct_here
 from bentray_workers.cluster.connection import open_cluster
 from bentray_workers.files.dataset import write_dataset
-from bentray_workers.reconstruction.memory.ray_memory import call_bytes
+from bentray_workers.reconstruction.ray_sizes import ray_task_sizes
 from bentray_workers.reconstruction.reconstruction_run import reconstruct
 
 from ...table6 import table6_scan
@@ -92,7 +92,7 @@ def test_the_plan_counts_what_is_in_flight(stack):
     def size(slices):
         scan = Summary(512, 512, slices * 512**2, slices, False, 0.0, 0.2, 0, False)
         settings = Settings.from_values(method="sart", nodes=256, device="opencl")
-        return call_bytes(scan, settings)["update_sart_slices"]
+        return ray_task_sizes(scan, settings)["update_sart_slices"].bytes
 
     assert size(1) > 8 * 512**2 + 30 * 256**2
     assert 0 < size(44) - size(8) < 36 * (size(8) - size(7)), "a processor holds eight slices"

@@ -14,7 +14,7 @@ from bentray_kernels.tomography.settings import DEVIATION
 from bentray_kernels.tomography.solver_choice import needs_device, sart_engine, solver_of, wave_engine
 from bentray_workers.cluster.capacities import MIB, resource_of
 from bentray_workers.files.dataset.counts import Summary
-from bentray_workers.reconstruction.memory.ray_memory import call_bytes
+from bentray_workers.reconstruction.ray_sizes import ray_task_sizes
 from bentray_workers.simulation.plane import SimulationSettings
 from bentray_workers.simulation.simulation_run import simulate
 from bentray_workers.simulation.volume import VolumeSimulationSettings
@@ -65,7 +65,9 @@ def test_executed_solver_equals_the_planned_one(scans, monkeypatch, rays, cut, e
 def test_the_plan_counts_the_arrays_of_what_runs(rays, eikonal):
     scan = Summary(1024, 1024, 1024**2, 1, False, 0.0, 0.2, 0, False)
     size = {
-        name: call_bytes(scan, Settings(method="sart", nodes=1024, rays=rays, eikonal=name))["update_sart"]
+        name: ray_task_sizes(scan, Settings(method="sart", nodes=1024, rays=rays, eikonal=name))[
+            "update_sart"
+        ].bytes
         for name in (eikonal, DEVIATION)
     }
     settings = Settings(method="sart", nodes=1024, rays=rays, eikonal=eikonal)

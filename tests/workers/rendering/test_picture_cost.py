@@ -1,18 +1,12 @@
-"""Estimated cost of pictures: at least the measured memory, and rejections that name what fits."""
+"""Estimated cost of pictures grows with what is drawn, and rejections name what fits."""
 
 import math
-import multiprocessing
 
-import numpy as np
 import pytest
-from benchmarks.reconstruction._worker_use import forget_peak, peak_bytes
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.requests.request_fields import MAX_PIXELS
 from bentray_workers.cluster.capacities import WorkerCapacity
-from bentray_workers.files.volume import Volume, write_volume
-from bentray_workers.files.volume_export import export_volume
-from bentray_workers.images.drawing_tasks import volume_slice_png
 from bentray_workers.rendering import picture_cost
 from bentray_workers.rendering.field_view import FieldView
 from bentray_workers.rendering.picture_cost import (
@@ -23,7 +17,6 @@ from bentray_workers.rendering.picture_cost import (
     placed,
     refraction_cost,
 )
-from bentray_workers.rendering.refraction import tile_image
 from bentray_workers.rendering.refraction_view import RefractionView
 
 GIB = 2**30
@@ -84,81 +77,3 @@ def test_eligible_workers_of_a_turntable():
     assert placed(2**20, workers) == {"resources": {"render": 1}}
     assert placed(GIB, workers) == {"resources": {"render": 1, "recon": 1}, "workers": ["large"]}
     assert placed(GIB, {"any": WorkerCapacity(0, LANES)}) == {"resources": {"render": 1}}
-
-
-def taken(work, *given) -> int:
-    """Bytes that a call takes beyond those of a process that has made a small one, in a new process."""
-    with multiprocessing.get_context("spawn").Pool(1) as pool:
-        return int(pool.apply(_peak, (work, given)))
-
-
-def _peak(work, given) -> int:
-    small, *rest = given
-    _call(work, *small)
-    forget_peak()
-    before = peak_bytes()
-    _call(work, *rest)
-    return peak_bytes() - before
-
-
-def _call(work, *given) -> None:
-    positional = [one for one in given if not isinstance(one, dict)]
-    work(
-        *positional, **{name: value for one in given if isinstance(one, dict) for name, value in one.items()}
-    )
-
-
-@pytest.fixture(scope="module")
-def volumes(tmp_path_factory):
-    """A small volume and a large one of 200³ float32."""
-    folder = tmp_path_factory.mktemp("volumes")
-    for name, n in (("small", 8), ("large", 200)):
-        x = np.linspace(-1.0, 1.0, n, dtype=np.float32)
-        ball = x[:, None, None] ** 2 + x[None, :, None] ** 2 + x[None, None, :] ** 2
-        write_volume(folder / f"{name}.h5", Volume.from_values(ball, (1e-3,) * 3))
-    return folder
-
-
-LARGE = VolumeFile((200, 200, 200), 4)
-
-
-@pytest.mark.slow
-@pytest.mark.nightly
-@pytest.mark.parametrize("name", ["bspline3", "trilinear"])
-def test_tile_stays_within_the_planned_memory(volumes, name):
-    small = RefractionView(iso=(0.9,), filter=name, width=8, height=8)
-    view = RefractionView(iso=(0.9,), filter=name, width=4096, height=4096)
-    measured = taken(
-        tile_image, (volumes / "small.h5", small, 0, 8), volumes / "large.h5", view, 1024, 1024 + 128
-    )
-    planned = picture_cost.refraction_bytes((200, 200, 200), view)
-    assert planned / 2 < measured < planned
-
-
-@pytest.mark.slow
-@pytest.mark.nightly
-@pytest.mark.parametrize(
-    "how", [{}, {"size": 4096, "frame": False}, {"size": 4096, "interpolation": "cubic"}]
-)
-def test_a_slice_takes_no_more_memory_than_planned(volumes, how):
-    measured = taken(volume_slice_png, (volumes / "small.h5",), volumes / "large.h5", how)
-    assert measured < picture_cost.slice_cost(LARGE, how.get("size")).bytes
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "name",
-    [
-        "npy",
-        *(
-            pytest.param(one, marks=pytest.mark.nightly)
-            for one in ("nifti", "metaimage", "nrrd", "mat", "vti", "ome-zarr", "dicom")
-        ),
-    ],
-)
-def test_an_export_takes_no_more_memory_than_planned(volumes, tmp_path, name):
-    # The library of a format is loaded by its first export.
-    small = {"target": tmp_path / "small", "name": "npy"}
-    large = {"target": tmp_path / "large", "name": name}
-    measured = taken(export_volume, (volumes / "small.h5", small), volumes / "large.h5", large)
-    assert measured < picture_cost.export_cost(LARGE, name).bytes

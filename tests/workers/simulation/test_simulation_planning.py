@@ -9,12 +9,9 @@ from hypothesis import strategies as st
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.cluster.capacities import MIB, WorkerCapacity
 from bentray_workers.simulation import simulation_planning
-from bentray_workers.simulation.cost import task_bytes
 from bentray_workers.simulation.parts import parts_of
 from bentray_workers.simulation.request import PhantomScan
 from bentray_workers.simulation.simulation_planning import plan_simulation
-
-from ...memory_program import measured, wrong
 
 WORKER = WorkerCapacity(1024 * MIB, ("recon", "render"))
 WAVES = PhantomScan(waveform=True)
@@ -62,7 +59,7 @@ def test_every_emitter_is_in_one_part(elements, nodes, slices):
         (PhantomScan(phantom="table7", three_d=True, refinement=4), "nodes"),
         (PhantomScan(waveform=True, frequency_hz=5e6), "frequency_hz"),
         (PhantomScan(phantom="table7", waveform=True, frequency_hz=4e5), "frequency_hz"),
-        (PhantomScan(waveform=True, elements=4096, side_m=0.3), "elements"),
+        (PhantomScan(waveform=True, elements=4096, side_m=0.45), "elements"),
         (PhantomScan(phantom="table7", elements=4096, slices=1000), "elements"),
     ],
 )
@@ -85,14 +82,3 @@ def test_without_workers_it_is_planned_for_one():
     alone, none = plan_simulation(WAVES, [WORKER]), plan_simulation(WAVES, [])
     assert (alone.minutes, alone.workers, none.workers) == (none.minutes, 1, 0)
     assert "none is connected yet" in none.why
-
-
-@pytest.mark.slow
-@pytest.mark.nightly
-def test_tasks_stay_within_the_planned_memory():
-    scans = [
-        {"nodes": 100, "elements": 300, "snr": 10.0},
-        {"waveform": True, "frequency_hz": 3e5, "emissions": 2, "elements": 256, "snr": 9.0},
-    ]
-    for scan, taken in zip(scans, measured(f"{__package__}.simulation_memory", scans), strict=True):
-        assert not wrong(task_bytes(PhantomScan(**scan).chosen()), taken, 2.2, 24 * MIB), scan

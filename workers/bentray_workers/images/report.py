@@ -23,7 +23,6 @@ from .maps import (
     ATTENUATION,
     COVERAGE,
     DIFFERENCE,
-    FIXED_LIMITS,
     FROM_ZERO,
     RECOVERY,
     REFLECTION,
@@ -36,6 +35,7 @@ from .maps import (
     symmetric_limits,
 )
 from .residuals import draw_residuals
+from .slice import usual_limits
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -86,7 +86,7 @@ def _plain(result: Reconstruction, k: int) -> bytes:
         figure, panels = _sheet(result, k, 1 + has_section(result))
         _speed(next(panels), result, k)
         if has_section(result):
-            _section(next(panels), result, _limits(result.speed, result.coverage))
+            _section(next(panels), result, usual_limits("speed", result.speed, result.coverage))
         _maps(panels, result, k)
         _curves(panels, result)
         return to_png(figure)
@@ -186,14 +186,8 @@ def _quantities(result: Reconstruction) -> list[str]:
 
 def _speed(axes: Axes, result: Reconstruction, k: int) -> None:
     speed, grid = cut(result.speed, k), (result.spacing_m, result.origin_m)
-    limits = _limits(speed, cut(result.coverage, k))
+    limits = usual_limits("speed", speed, cut(result.coverage, k))
     draw_bar([draw_map(axes, speed, *grid, limits, colormap=SPEED, title="Reconstruction")], LABELS["speed"])
-
-
-def _limits(image: Floats, coverage: Floats) -> Limits:
-    """Limits from the nodes with rays, if any."""
-    passed = coverage > 0.0
-    return robust_limits([image], passed if passed.any() else None)
 
 
 def _maps(panels: Iterator[Axes], result: Reconstruction, k: int) -> None:
@@ -201,12 +195,7 @@ def _maps(panels: Iterator[Axes], result: Reconstruction, k: int) -> None:
         whole = result.image(name)
         assert whole is not None
         image, grid = cut(whole.values, k), (whole.spacing_m, whole.origin_m)
-        if name in FIXED_LIMITS:
-            limits = FIXED_LIMITS[name]
-        elif name in FROM_ZERO:
-            limits = (0.0, robust_limits([image])[1])
-        else:
-            limits = _limits(image, cut(result.coverage, k))
+        limits = usual_limits(name, image, None if name in FROM_ZERO else cut(result.coverage, k))
         shown = draw_map(next(panels), image, *grid, limits, colormap=COLORMAPS[name], title=NAMES[name])
         draw_bar([shown], LABELS[name])
 

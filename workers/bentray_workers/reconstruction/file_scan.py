@@ -16,7 +16,7 @@ from bentray_kernels.tomography.waveform.wave_scan import wave_problem_of
 from ..cluster.job_cancellation import check_job_active
 from ..files.dataset.scan import ScanHeader, open_slice, read_header
 from ..files.picking_files import read_findings, reference_path, with_reference
-from .memory.ray_memory import PROBLEMS_KEPT
+from .ray_sizes import PROBLEMS_KEPT
 
 # How many values of each kind a process keeps. Two jobs may alternate; more problems of waves would cost
 # memory, since they hold the traces of the object. Slices that a device updates together are of one job.

@@ -35,9 +35,8 @@ from bentray_kernels.acquisition.reference.chord_pulses import ChordPulses, read
 from bentray_kernels.acquisition.reference.water_chords import WaterChords, find_water_chords
 from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.requests.limits import MAX_LEFT_OUT
 from bentray_kernels.task_graph import Task
-from bentray_kernels.tomography import Progress
+from bentray_kernels.tomography import Progress, Settings
 
 from ..cluster.job_cancellation import check_job_active
 from ..files.dataset.scan import ScanHeader, open_slice
@@ -50,7 +49,7 @@ from ..files.picking_files import (
     write_reference,
 )
 from .file_scan import read_once
-from .memory.picking_memory import parts_of
+from .trace_sizes import parts_of
 
 PICKED, FINDINGS = "picked.h5", "findings.json"
 
@@ -95,23 +94,13 @@ class PickingSource(NamedTuple):
 
     Attributes:
         folder: of the job; once it is removed, tasks end with their present emission.
-        picker: for scans without travel times.
-        examine: whether the scan is examined first.
-        amplitudes: their source, see ``Settings``.
-        waves: whether traces are compared with simulated ones after picking.
-        water_temperature_c: in place of that of the file, °C.
-        max_left_out: share of the pairs beyond which the scan is refused, see ``Settings``.
+        settings: of the job.
     """
 
     path: Path
     stamp: int
     folder: Path
-    picker: str
-    examine: bool
-    amplitudes: str = "recorded"
-    waves: bool = False
-    water_temperature_c: float | None = None
-    max_left_out: float = MAX_LEFT_OUT
+    settings: Settings
 
     @property
     def dataset(self) -> Dataset:
@@ -121,22 +110,23 @@ class PickingSource(NamedTuple):
     @property
     def header(self) -> ScanHeader:
         """Facts about the scan without its traces."""
-        return read_once(self.path, self.stamp, self.water_temperature_c)
+        return read_once(self.path, self.stamp, self.settings.water_temperature_c)
 
     @property
     def examines_traces(self) -> bool:
         """Whether traces are examined."""
-        return self.examine and examines_traces(self.dataset, traces=self.header.samples > 0)
+        traces = self.header.samples > 0
+        return self.settings.picking.examine and examines_traces(self.dataset, traces=traces)
 
     @property
-    def reads_amplitudes(self) -> bool:
-        """Whether amplitudes are read from the traces."""
-        return self.amplitudes != "recorded"
+    def reads_times_or_amplitudes(self) -> bool:
+        """Whether travel times or amplitudes are read from the traces."""
+        return self.settings.reads_amplitudes or not self.dataset.picked
 
     @property
     def estimates_water(self) -> bool:
         """Whether a water shot is needed and must be estimated, because the file has none."""
-        needed = self.waves or self.reads_amplitudes or not self.dataset.picked
+        needed = self.settings.method == "waveform" or self.reads_times_or_amplitudes
         return needed and self.header.lacks_water and self.dataset.center_frequency_hz is not None
 
     @contextmanager
@@ -170,11 +160,10 @@ class PickingGraph:
         dataset = source.dataset
         self._slices = range(dataset.slices)
         self._parts: list[range] = []
-        self._picks = False
-        if source.reads_amplitudes or not dataset.picked:
+        self._picks = source.reads_times_or_amplitudes
+        if self._picks:
             with source.slice(0) as scan_2d:
                 require_traces(scan_2d, water=False)
-            self._picks = True
         self._estimates = source.estimates_water
         self._examines = source.examines_traces
         if self._picks or self._estimates or self._examines:
@@ -287,7 +276,7 @@ def find_chords(
     """Task: the chords of a slice through water, from which its water shot is estimated, and all findings."""
     dataset = apply(source.dataset.slice(index), findings)
     measures = Measured.joined(measured).object
-    if source.examine:
+    if source.settings.picking.examine:
         more, chords = examine_chords(dataset, measures)
         return ExaminedChords((*findings, *_usable(source, index, more)), chords)
     return ExaminedChords(findings, find_water_chords(dataset, measures.strongest_s))
@@ -305,7 +294,9 @@ def estimate_slice_water(
     """Task: estimate the water shot of a slice and write it; the findings with what was estimated."""
     dataset = apply(source.dataset.slice(index), examined.findings)
     pulses = ChordPulses.joined(pulses_read)
-    later, reference = estimate_from_pulses(dataset, examined.chords, pulses, examine=source.examine)
+    later, reference = estimate_from_pulses(
+        dataset, examined.chords, pulses, examine=source.settings.picking.examine
+    )
     write_reference(reference_path(source.folder, index), reference)
     return (*examined.findings, *_usable(source, index, later))
 
@@ -314,16 +305,17 @@ def pick_emissions(
     source: PickingSource, index: int, findings: tuple[Finding, ...], emissions: range
 ) -> EmissionPicks:
     """Task: times of a batch of emissions with standard deviations, and amplitudes if needed."""
+    settings = source.settings
     with source.with_water(index, findings) as dataset:
         if dataset.picked:
             delta = dataset.differential_tof()[emissions.start : emissions.stop]
             sigma = np.full_like(delta, np.nan)
         else:
             require_traces(dataset)
-            delta, sigma = read_times(dataset, emissions, source.picker)
-        ratio = (
-            read_log_ratios(dataset, emissions, delta, source.amplitudes) if source.reads_amplitudes else None
-        )
+            delta, sigma = read_times(dataset, emissions, settings.picking.picker)
+        ratio = None
+        if settings.reads_amplitudes:
+            ratio = read_log_ratios(dataset, emissions, delta, settings.attenuation.amplitudes)
         return EmissionPicks(delta, sigma, ratio)
 
 
@@ -331,16 +323,16 @@ def finish_slice(
     source: PickingSource, index: int, findings: tuple[Finding, ...], picks: list[EmissionPicks]
 ) -> tuple[Dataset, tuple[Finding, ...]]:
     """Task: one slice to reconstruct, without traces, and all findings in it."""
-    dataset = apply(source.dataset.slice(index), findings)
+    dataset, picking = apply(source.dataset.slice(index), findings), source.settings.picking
     if picks and not dataset.picked:
         delta, sigma = (np.concatenate(rows) for rows in zip(*(pick[:2] for pick in picks), strict=True))
-        delta, sigma = screen_times(dataset, delta, sigma, screened=not source.examine)
-        dataset = replace(dataset, delta_tof_s=delta, sigma_s=sigma, tof_s=None, picker=source.picker)
-    if source.reads_amplitudes:
+        delta, sigma = screen_times(dataset, delta, sigma, screened=not picking.examine)
+        dataset = replace(dataset, delta_tof_s=delta, sigma_s=sigma, tof_s=None, picker=picking.picker)
+    if source.settings.reads_amplitudes:
         ratio = np.concatenate([pick.ratio for pick in picks if pick.ratio is not None])
         ratio = np.where(np.isfinite(dataset.differential_tof()), ratio, np.nan)
         dataset = replace(dataset, log_ratio_np=ratio, amplitude_frequency_hz=dataset.center_frequency_hz)
-    if source.examine:
+    if picking.examine:
         later = _usable(source, index, check_times(dataset))
         dataset, findings = apply(dataset, later), (*findings, *later)
     return dataset, findings
@@ -350,22 +342,22 @@ def write_picked(
     source: PickingSource, files: PickingFiles, slices: list[tuple[Dataset, tuple[Finding, ...]]]
 ) -> None:
     """Task: write the picked dataset, unless it equals the scan, and then all findings."""
-    whole = source.dataset
+    whole, picking = source.dataset, source.settings.picking
     impossible = find_impossible(whole.impossible_times)
     counted = [count_left_out(whole.slice(k), of_slice) for k, (_, of_slice) in enumerate(slices)]
-    if source.examine:
-        too_few = find_too_few(counted, whole.impossible_times, source.max_left_out)
+    if picking.examine:
+        too_few = find_too_few(counted, whole.impossible_times, picking.max_left_out)
         _usable(source, 0, too_few)
     of_slices = (replace(finding, slice=k) for k, (_, faults) in enumerate(slices) for finding in faults)
     findings = (*impossible, *of_slices)
     corrected = any(finding.action != "reported" for finding in findings)
-    changed = source.reads_amplitudes or not whole.picked or corrected
+    changed = source.reads_times_or_amplitudes or corrected
     datasets = [dataset for dataset, _ in slices]
     picked = datasets[0] if whole.slice_z_m is None else stacked(whole, datasets)
     if changed:
         write_dataset(files.picked, replace(picked, truth=whole.truth))
     left_out = sum(pairs.left_out for pairs in counted)
-    record = ScanFindings(findings, source.examine, changed, *count_usable(picked), left_out)
+    record = ScanFindings(findings, picking.examine, changed, *count_usable(picked), left_out)
     write_findings(files.findings, record, files.picked if changed else None)
 
 

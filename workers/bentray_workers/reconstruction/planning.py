@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Literal
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.requests.limits import WIDTH_M
@@ -26,27 +27,32 @@ from bentray_kernels.tomography.stage_graphs import BATCH
 
 from ..cluster.capacities import MIB, REAL, Lane, WorkerCapacity, resource_of, without_device
 from ..cluster.checkpoints import KEPT
+from ..cluster.task_costs import Sizes, TaskPlan, bytes_of, largest_of, largest_sizes
 from ..cluster.task_words import task_in_words
 from ..files.dataset.counts import Summary
 from ..files.dataset.read import PAIR_ARRAYS
 from ..files.quantities import IMAGES
 from .blocks.block_choice import fitting_blocks
-from .memory.block_memory import block_files_bytes
-from .memory.picking_memory import picking_tasks
-from .memory.ray_memory import (
-    call_bytes,
+from .ray_sizes import (
+    block_files_bytes,
     emitters_of,
-    field_bytes,
-    ray_task_parts,
-    rays_of,
+    front_bytes,
+    problems_of,
+    ray_task_sizes,
     rows_bytes,
     shape_of,
     slice_bytes,
     state_bytes,
 )
-from .memory.reflection_memory import reflection_bytes, reflection_task_bytes, reflection_tasks
-from .memory.waveform_memory import budgeted, least_batch_bytes, wave_task_bytes, wave_tasks
 from .reconstruction_cost import reconstruction_cost
+from .trace_sizes import (
+    picking_task_sizes,
+    picking_tasks,
+    reflection_bytes,
+    reflection_task_sizes,
+    reflection_tasks,
+)
+from .waveform_memory import budgeted, least_batch_bytes, wave_task_bytes, wave_tasks
 
 Decomposition = Literal["slices", "emitters", "volume"]
 
@@ -56,21 +62,27 @@ RECORD_BYTES = 64 * 2**10
 # Nodes crossed by rays in half a second of SART on a core of 2020; for the estimated number of tasks.
 NODES_IN_A_TASK = 1.5e7
 
+# The setting to change where a task takes too much memory; of others ``nodes``.
+FIELDS: Mapping[str, str] = MappingProxyType(
+    {
+        "validate_image": "method",
+        **dict.fromkeys(("start_band", "evaluate_emitter", "update_image"), "minutes"),
+        **dict.fromkeys(("solve_element_times", "measure_scan_pulse", "sum_emissions"), "reflection"),
+    }
+)
+
 # Tasks about a block for each emitter: some sweeps, its rays, their back-projection, and the update.
 BLOCK_TASKS = 6
 
 
-@dataclass(frozen=True)
-class Plan:
+@dataclass(frozen=True, kw_only=True)
+class Plan(TaskPlan):
     """Tasks of a reconstruction and their memory.
 
     Attributes:
         decomposition: ``slices`` in parallel; ``emitters`` of each slice in parallel; a ``volume``.
-        lane: resource of the workers.
+        lane: see ``capacities.Lane``.
         tasks: estimated number of tasks.
-        workers: connected workers that can run each of them.
-        call_bytes: memory of one task by its name: working arrays, arguments and cached parts of the
-            dataset.
         field_bytes, rows_bytes, state_bytes: of a travel time; of all rays of an image; of the state between
             two tasks.
         stored_bytes: largest disk space of result and checkpoints.
@@ -78,35 +90,18 @@ class Plan:
         nodes: along each side of the image.
         methods: the method and rays, or the candidates of auto, in words.
         work_class, work_s, speed_known: see ``reconstruction_cost.ReconstructionCost``.
-        why: summary in a sentence.
     """
 
-    decomposition: Decomposition
-    lane: Lane
-    tasks: int
-    workers: int
-    call_bytes: Mapping[str, int]
     field_bytes: int
     rows_bytes: int
     state_bytes: int
     stored_bytes: int
     blocks: int
     nodes: int
-    methods: tuple[str, ...]
+    methods: list[str]
     work_class: str
     work_s: float
     speed_known: bool
-    why: str
-
-    @property
-    def largest(self) -> tuple[str, int]:
-        """The task with the largest memory, and this memory, bytes."""
-        return max(self.call_bytes.items(), key=lambda item: item[1])
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain values for JSON."""
-        lists = {"call_bytes": dict(self.call_bytes), "methods": list(self.methods)}
-        return {**asdict(self), **lists, "largest_bytes": self.largest[1]}
 
 
 def plan(scan: Summary, settings: Settings, capacities: Sequence[WorkerCapacity]) -> Plan:
@@ -132,38 +127,28 @@ def plan(scan: Summary, settings: Settings, capacities: Sequence[WorkerCapacity]
     if capacities and not fitting:
         raise without_device(settings)
     settings = settings.changed(blocks=fitting_blocks(scan, settings, fitting))
-    methods = [settings]
-    if settings.selects_model:
-        methods = [final_settings(settings, changes) for changes in CANDIDATES]
-    calls: dict[str, int] = {}
-    for method in methods:
-        for name, size in call_bytes(scan, method).items():
-            calls[name] = max(size, calls.get(name, 0))
+    methods = _final_settings(settings)
     if settings.method == "waveform":
         samples = 0 if scan.traces is None else scan.traces.samples
         check_waveform(settings, samples, scan.slices, in_space=scan.in_space)
+    check_reflection(settings, traces=scan.echoes is not None, in_space=scan.in_space)
     # Candidates of 3-D arrays are validated by times alone.
     traces = None if scan.in_space and settings.method == "auto" else scan.traces
     refining = budgeted(traces, scan.width_m, scan.slices, settings)
-    waves = wave_task_bytes(traces, scan.width_m, refining)
-    calls |= waves
-    check_reflection(settings, traces=scan.echoes is not None, in_space=scan.in_space)
-    echoes = reflection_task_bytes(scan, settings)
-    calls |= echoes
+    calls = bytes_of(task_sizes(scan, settings)) | wave_task_bytes(traces, scan.width_m, refining)
     _check_device(scan, methods, least_batch_bytes(traces, scan.width_m, refining), fitting)
     limit = max((one.task_bytes for one in fitting), default=math.inf)
-    name, size = max(calls.items(), key=lambda item: item[1])
-    if size > limit:
-        field: str = "nodes" if name not in waves else "method" if name == "validate_image" else "minutes"
-        found = name in echoes or getattr(settings, field)
-        field = "reflection" if name in echoes else field
+    name, largest = largest_of(calls)
+    if largest > limit:
+        field = FIELDS.get(name, "nodes")
+        given = field == "reflection" or getattr(settings, field)
         raise InvalidInput(
             field,
-            f"{found}, for which a task ({task_in_words(name)}) takes {size} bytes"
-            + _largest_part(scan, methods, name),
+            f"{given}, for which a task ({task_in_words(name)}) takes {largest} bytes"
+            + _largest_term(scan, methods, name),
             f"settings whose tasks take at most {limit:.0f} bytes" + _advice(scan, settings, limit),
         )
-    able = [one for one in fitting if one.task_bytes >= size]
+    able = [one for one in fitting if one.task_bytes >= largest]
     shape = shape_of(scan, settings)
     decomposition = _decomposition(settings)
     tasks = sum(_tasks(scan, method, shape) for method in methods)
@@ -172,23 +157,45 @@ def plan(scan: Summary, settings: Settings, capacities: Sequence[WorkerCapacity]
         tasks += picking_tasks(scan.recorded, scan.slices, settings)
     cost = reconstruction_cost(scan, settings, len(able))
     return Plan(
-        decomposition,
-        lane,
-        tasks,
-        len(able),
-        calls,
-        max(field_bytes(shape, method.ray_eikonal) for method in methods),
-        max(rows_bytes(scan, method, rays_of(scan, method)) for method in methods),
-        state_bytes(shape, settings),
-        _stored_bytes(scan, settings, shape),
-        settings.numerics.blocks,
-        settings.grid_nodes,
-        _methods(settings),
-        cost.work_class,
-        cost.seconds,
-        cost.speed_known,
-        _why(scan, settings, decomposition, lane, tasks, (name, size), capacities, able),
+        decomposition=decomposition,
+        lane=lane,
+        tasks=tasks,
+        workers=len(able),
+        call_bytes=calls,
+        field_bytes=max(front_bytes(shape, method.ray_eikonal) for method in methods),
+        rows_bytes=max(rows_bytes(scan, method) for method in methods),
+        state_bytes=state_bytes(shape, settings),
+        stored_bytes=_stored_bytes(scan, settings, shape),
+        blocks=settings.numerics.blocks,
+        nodes=settings.grid_nodes,
+        methods=_methods(settings),
+        work_class=cost.work_class,
+        work_s=cost.seconds,
+        speed_known=cost.speed_known,
+        why=_why(scan, settings, decomposition, lane, tasks, (name, largest), capacities, able),
     )
+
+
+def task_sizes(scan: Summary, settings: Settings) -> Sizes:
+    """What determines the memory of each task, by its name; see ``waveform_memory`` for those of waves.
+
+    Args:
+        scan: the dataset.
+        settings: with nodes and decomposition.
+    """
+    methods = _final_settings(settings)
+    return {
+        **largest_sizes(picking_task_sizes(scan, method) for method in methods),
+        **largest_sizes(ray_task_sizes(scan, method) for method in methods),
+        **reflection_task_sizes(scan, settings),
+    }
+
+
+def _final_settings(settings: Settings) -> list[Settings]:
+    """The settings, or those with which auto ends after each of its candidates."""
+    if not settings.selects_model:
+        return [settings]
+    return [final_settings(settings, changes) for changes in CANDIDATES]
 
 
 def _check_extent(scan: Summary) -> None:
@@ -227,18 +234,17 @@ def _decomposition(settings: Settings) -> Decomposition:
     return "slices" if settings.method == "sart" else "emitters"
 
 
-def _methods(settings: Settings) -> tuple[str, ...]:
+def _methods(settings: Settings) -> list[str]:
     """The candidates of auto with the requested rays, or the one method, in words."""
     if not settings.selects_model:
-        return (label({"rays": settings.rays, "method": settings.method}),)
+        return [label({"rays": settings.rays, "method": settings.method})]
     tried = [one for one in CANDIDATES if settings.rays == "curved" or one["rays"] == "straight"]
-    return tuple(dict.fromkeys(label(one) for one in tried))
+    return list(dict.fromkeys(label(one) for one in tried))
 
 
 def _tasks(scan: Summary, settings: Settings, shape: tuple[int, ...]) -> int:
     """Estimated number of tasks, with stages on coarser grids."""
-    problems = 1 if settings.decomposition == "volume" else scan.slices
-    emitters = emitters_of(scan, settings)
+    problems, emitters = problems_of(scan, settings), emitters_of(scan, settings)
     parts = -(-emitters // BATCH)
     passes = settings.iterations * (settings.numerics.coarser_grids + 1)
     if settings.numerics.blocks > 1:
@@ -255,12 +261,11 @@ def _tasks(scan: Summary, settings: Settings, shape: tuple[int, ...]) -> int:
 
 def _stored_bytes(scan: Summary, settings: Settings, shape: tuple[int, ...]) -> int:
     """Without compression: all images of the result, checkpoints, and picked times."""
-    problems = 1 if settings.decomposition == "volume" else scan.slices
     picked = len(PAIR_ARRAYS) * REAL * scan.pairs if scan.traces_bytes else 0
     each = len(IMAGES) * REAL * math.prod(shape) + KEPT * state_bytes(shape, settings) + RECORD_BYTES
     each += reflection_bytes(scan, settings)
     each += block_files_bytes(shape) if settings.numerics.blocks > 1 else 0
-    return problems * each + picked + _trials_bytes(scan, settings)
+    return problems_of(scan, settings) * each + picked + _trials_bytes(scan, settings)
 
 
 def _trials_bytes(scan: Summary, settings: Settings) -> int:
@@ -271,20 +276,22 @@ def _trials_bytes(scan: Summary, settings: Settings) -> int:
     return sum(KEPT * state_bytes(shape_of(scan, one), one) + RECORD_BYTES for one in plans)
 
 
-def _largest_part(scan: Summary, methods: Sequence[Settings], name: str) -> str:
+def _largest_term(scan: Summary, methods: Sequence[Settings], name: str) -> str:
     """What takes most memory of a task that uses rays, in words; empty for other tasks."""
-    parts = [parts for method in methods if (parts := ray_task_parts(scan, method).get(name))]
-    if not parts:
+    rays = largest_sizes(ray_task_sizes(scan, method) for method in methods)
+    if name not in rays:
         return ""
-    part, size = max(max(parts, key=lambda one: sum(one.values())).items(), key=lambda item: item[1])
-    return f", {size} of them for {part}"
+    term, most = largest_of(rays[name].terms)
+    return f", {most} of them for {term.partition(',')[0]}"
 
 
 def _advice(scan: Summary, settings: Settings, limit: float) -> str:
     """The largest grid that fits, in words; empty without one."""
 
     def fits(nodes: int) -> bool:
-        return max(call_bytes(scan, settings.changed(nodes=nodes, coarser_grids=0)).values()) <= limit
+        smaller = settings.changed(nodes=nodes, coarser_grids=0)
+        sizes = picking_task_sizes(scan, smaller) | ray_task_sizes(scan, smaller)
+        return largest_of(bytes_of(sizes))[1] <= limit
 
     if settings.selects_model or not fits(MIN_NODES):
         return _blocks_advice(scan, settings)

@@ -20,9 +20,9 @@ from bentray_kernels.tomography.model_selection.selection import (
 from bentray_kernels.tomography.settings import DEVIATION, Settings
 
 from ..files.dataset.counts import Summary
-from .memory.ray_memory import emitters_of, shape_of
-from .memory.reflection_memory import reflection_seconds
-from .memory.waveform_memory import budgeted, wave_minutes
+from .ray_sizes import emitters_of, problems_of, shape_of
+from .trace_sizes import reflection_seconds
+from .waveform_memory import budgeted, wave_minutes
 
 # Node visits of a core in a second, see ``_visits``: 256 emitters on 128 x 128 nodes take 0.96 ms an emitter
 # with SART and 7 ms with Gauss-Newton (benchmarks/results/distributed.json).
@@ -70,8 +70,7 @@ def reconstruction_cost(scan: Summary, settings: Settings, workers: int) -> Reco
         samples = 2.0 * scan.slices * recorded.emissions * recorded.receivers * recorded.samples
         picking = samples / SAMPLES_PER_S
     sequential = settings.method == "sart"
-    problems = 1 if settings.decomposition == "volume" else scan.slices
-    at_once = max(1, min(workers, problems) if sequential else workers)
+    at_once = max(1, min(workers, problems_of(scan, settings)) if sequential else workers)
     parallel = picking + waves + reflection_seconds(scan, settings)
     seconds = OVERHEAD_S + rays / at_once + parallel / max(1, workers)
     return ReconstructionCost(_class(scan, settings, waves > 0.0), seconds, _speed_known(settings))
@@ -111,8 +110,7 @@ def _rays_seconds(scan: Summary, settings: Settings) -> float:
 
 
 def _method_seconds(scan: Summary, settings: Settings) -> float:
-    problems = 1 if settings.decomposition == "volume" else scan.slices
-    return problems * _problem_seconds(scan, settings)
+    return problems_of(scan, settings) * _problem_seconds(scan, settings)
 
 
 def _problem_seconds(scan: Summary, settings: Settings) -> float:

@@ -157,18 +157,7 @@ class _Job(NamedTuple):
 
 def _pick(job: _Job, settings: Settings, show: _Show) -> tuple[Path, ScanFindings]:
     """A file with travel times, and the findings in the scan."""
-    amplitudes = settings.attenuation.amplitudes if settings.reads_amplitudes else "recorded"
-    source = PickingSource(
-        job.scan,
-        job.stamp,
-        job.folder,
-        settings.picking.picker,
-        settings.picking.examine,
-        amplitudes,
-        settings.method == "waveform",
-        settings.water_temperature_c,
-        settings.picking.max_left_out,
-    )
+    source = PickingSource(job.scan, job.stamp, job.folder, settings)
     files = PickingFiles.in_folder(job.folder)
     try:
         findings = read_findings(files.findings, files.picked)

@@ -55,7 +55,7 @@ READ_S = 2e-9
 
 # Measured with up to 380³ nodes: of any file that is read; per node while a volume is filtered; of a mesh,
 # per node of its grid and per cut edge (325 MiB for 74,896 edges in 120³ nodes).
-FILE_BYTES = 16 * MIB
+FILE_BYTES = 20 * MIB
 FILTER_BYTES, MESHED_BYTES, CROSSING_BYTES = 26, 17, 4600
 
 # Of a geometry field: per camera ray, and per surface at which it may continue (twice with exact lookups).

@@ -2,40 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 from ..cluster.capacities import MIB, WorkerCapacity
+from ..cluster.task_costs import TaskPlan
 from .picture_cost import Cost, check_memory, refraction_bytes, refraction_seconds
 from .tiles import tile_rows
 from .turntable import Turntable, draw_frame_tile, write_frame
 
 
-@dataclass(frozen=True)
-class TurntablePlan:
+@dataclass(frozen=True, kw_only=True)
+class TurntablePlan(TaskPlan):
     """Tasks of a turntable and their cost.
 
     Attributes:
-        tasks: number of tasks.
-        workers: connected workers that can run each of them.
-        call_bytes: memory of each kind of task.
         work_class: turntables of one class take times in proportion to ``work_s``.
         work_s: time of the counted work on these workers, if they are idle cores of 2023.
-        why: summary in a sentence.
+        speed_known: as of plans of reconstructions.
     """
 
-    tasks: int
-    workers: int
-    call_bytes: Mapping[str, int]
+    decomposition: str = "frames"
+    lane: str = "drawing"
     work_class: str
     work_s: float
-    why: str
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain values for JSON, with the names of plans of reconstructions."""
-        sizes = {"call_bytes": dict(self.call_bytes), "largest_bytes": max(self.call_bytes.values())}
-        return {**asdict(self), **sizes, "decomposition": "frames", "lane": "drawing", "speed_known": True}
+    speed_known: bool = True
 
 
 def plan_turntable(
@@ -65,4 +56,6 @@ def plan_turntable(
     )
     name = "glass" if turntable.mode == "refract" else "lit surface"
     calls = {draw_frame_tile.__name__: size, write_frame.__name__: size}
-    return TurntablePlan(tasks, able, calls, f"turntable, {name}", work, why)
+    return TurntablePlan(
+        tasks=tasks, workers=able, call_bytes=calls, why=why, work_class=f"turntable, {name}", work_s=work
+    )

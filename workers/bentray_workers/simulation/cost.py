@@ -6,22 +6,16 @@ from bentray_kernels.acquisition.simulation.volume_scan import AXIAL_MARGIN_NODE
 from bentray_kernels.wave.memory import padded_nodes
 from bentray_kernels.wave.points import REACH
 
-from ..cluster.capacities import MIB, REAL
+from ..cluster.capacities import REAL
+from ..cluster.task_costs import Sizes, TaskSize
 from .plane import SimulationSettings
 from .volume import VolumeSimulationSettings
 from .waves import WaveSimulationSettings
 
 Timed = SimulationSettings | VolumeSimulationSettings
 
-# Python's own part of any task.
-FLOOR_BYTES = 18 * MIB
-
-# Bytes per node of the fine grid: media, sampling of one of them, and a marching front; of the padded grid
-# of a wave: both media while they are made, and two fields.
-PLANE_BYTES, SPACE_BYTES, WAVE_BYTES = 96, 96, 88
-
-# Bytes per pair while the file is written: times, losses, and their noise.
-PAIR_BYTES, LOSS_BYTES, NOISE_BYTES = 20, 12, 16
+# Term of the memory of waves.
+NODES = "padded nodes"
 
 # Seconds on a core of 2020: per node of a medium, without and with attenuation; per node of a wave front;
 # per padded node of the media of a wave, and per node and time step in 2-D and 3-D; per byte of a file.
@@ -46,26 +40,25 @@ def emitters_a_task(settings: Timed) -> int:
     return max(1, min(MAX_EMITTERS, int(TASK_S / (FRONT_S * fine_nodes(settings)))))
 
 
-def task_bytes(settings: Timed | WaveSimulationSettings) -> dict[str, int]:
-    """Memory of each kind of task beyond that of a warm worker, bytes.
-
-    Returns:
-        By function: ``make_part`` and ``write_scan``.
-    """
+def task_sizes(settings: Timed | WaveSimulationSettings) -> Sizes:
+    """What determines the memory of each kind of task, by function: ``make_part`` and ``write_scan``."""
     if isinstance(settings, WaveSimulationSettings):
         traces = settings.elements * settings.samples
-        arrays = _grid_bytes(settings) + _trace_bytes(settings)
-        written = 6 * REAL * traces + 8 * settings.emissions * settings.elements
-        truth = PLANE_BYTES * settings.nodes**2
-    else:
-        in_space = isinstance(settings, VolumeSimulationSettings)
-        marched = isinstance(settings, VolumeSimulationSettings) and settings.three_d
-        arrays = (SPACE_BYTES if marched else PLANE_BYTES) * fine_nodes(settings)
-        each = PAIR_BYTES + LOSS_BYTES * settings.attenuation + NOISE_BYTES * _noisy(settings)
-        written = each * pairs(settings)
-        heights = settings.slices if isinstance(settings, VolumeSimulationSettings) else 1
-        truth = (SPACE_BYTES if in_space else PLANE_BYTES) * settings.nodes**2 * heights
-    return {"make_part": FLOOR_BYTES + arrays, "write_scan": FLOOR_BYTES + written + truth}
+        written = {"samples": traces, "pairs": settings.emissions * settings.elements}
+        # The truth of a 3-D phantom is a section of its volume.
+        written["images" if settings.dimensions == 2 else "a section"] = settings.nodes**2
+        return {
+            "make_part": TaskSize("make_part, waves", {NODES: _padded(settings), "samples": traces}),
+            "write_scan": TaskSize("write_scan, waves", written),
+        }
+    heights = settings.slices if isinstance(settings, VolumeSimulationSettings) else 1
+    written = {"pairs": pairs(settings), "nodes": settings.nodes**2 * heights}
+    written["losses"] = settings.attenuation * pairs(settings)
+    written["noise"] = _noisy(settings) * (1 + settings.attenuation) * pairs(settings)
+    return {
+        "make_part": TaskSize("make_part", {"nodes": fine_nodes(settings)}),
+        "write_scan": TaskSize("write_scan", written),
+    }
 
 
 def costly_setting(settings: Timed | WaveSimulationSettings, task: str) -> str:
@@ -73,7 +66,8 @@ def costly_setting(settings: Timed | WaveSimulationSettings, task: str) -> str:
     if task == "write_scan":
         return "elements"
     if isinstance(settings, WaveSimulationSettings):
-        return "elements" if _trace_bytes(settings) > _grid_bytes(settings) else "frequency_hz"
+        terms = task_sizes(settings)[task].terms
+        return "frequency_hz" if max(terms, key=lambda term: terms[term]) == NODES else "elements"
     return "nodes"
 
 
@@ -102,15 +96,6 @@ def cpu_seconds(settings: Timed | WaveSimulationSettings) -> tuple[float, float]
 def pairs(settings: Timed) -> int:
     """Number of pairs of all scans."""
     return settings.scans * settings.emitters**2
-
-
-def _grid_bytes(settings: WaveSimulationSettings) -> int:
-    return WAVE_BYTES * _padded(settings)
-
-
-def _trace_bytes(settings: WaveSimulationSettings) -> int:
-    """Every time step in both media, and the recorded samples."""
-    return (2 * REAL * settings.skip + 8) * settings.elements * settings.samples
 
 
 def _noisy(settings: Timed) -> bool:

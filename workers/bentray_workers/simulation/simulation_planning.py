@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 from bentray_kernels.errors import InvalidInput
 
 from ..cluster.capacities import MIB, WorkerCapacity
+from ..cluster.task_costs import TaskPlan, bytes_of, largest_of
 from ..cluster.task_words import task_in_words
 from ..files.hdf5_reading import Limits
-from .cost import costly_setting, cpu_seconds, result_bytes, task_bytes
+from .cost import costly_setting, cpu_seconds, result_bytes, task_sizes
 from .parts import count_of
 from .request import PhantomScan
 
@@ -20,30 +20,19 @@ from .request import PhantomScan
 MAX_TASKS = 200_000
 
 
-@dataclass(frozen=True)
-class SimulationPlan:
+@dataclass(frozen=True, kw_only=True)
+class SimulationPlan(TaskPlan):
     """Tasks of a simulation and their cost.
 
     Attributes:
-        tasks: number of tasks.
-        workers: connected workers that can run each of them.
-        call_bytes: memory of each kind of task.
         result_bytes: of the file, at most; the parts take as much until the job ends.
         minutes: estimated duration on these workers, if they are idle cores of 2020.
-        why: summary in a sentence.
     """
 
-    tasks: int
-    workers: int
-    call_bytes: Mapping[str, int]
+    decomposition: str = "emitters"
+    lane: str = "recon"
     result_bytes: int
     minutes: float
-    why: str
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain values for JSON, with the names of plans of reconstructions."""
-        sizes = {"call_bytes": dict(self.call_bytes), "largest_bytes": max(self.call_bytes.values())}
-        return {**asdict(self), **sizes, "decomposition": "emitters", "lane": "recon"}
 
 
 def plan_simulation(request: PhantomScan, capacities: Sequence[WorkerCapacity]) -> SimulationPlan:
@@ -58,14 +47,14 @@ def plan_simulation(request: PhantomScan, capacities: Sequence[WorkerCapacity]) 
             the setting with the largest effect.
     """
     settings = request.chosen()
-    calls, size = task_bytes(settings), result_bytes(settings)
+    calls, size = bytes_of(task_sizes(settings)), result_bytes(settings)
     most = Limits().total_bytes
     if size > most:
         given = f"{settings.elements}, a file of {size} bytes"
         raise InvalidInput("elements", given, f"so few that the file has at most {most} bytes")
     able = [capacity for capacity in capacities if "recon" in capacity.resources]
     limit = max((capacity.task_bytes for capacity in able), default=math.inf)
-    name, largest = max(calls.items(), key=lambda item: item[1])
+    name, largest = largest_of(calls)
     if largest > limit:
         field = costly_setting(settings, name)
         given = (
@@ -85,7 +74,9 @@ def plan_simulation(request: PhantomScan, capacities: Sequence[WorkerCapacity]) 
         f"{tasks} tasks, about {_duration(minutes)} {where}; the largest ({task_in_words(name)}) takes "
         f"{largest / MIB:.0f} MiB, the file {size / MIB:.1f} MiB at most."
     )
-    return SimulationPlan(tasks, len(able), calls, size, minutes, why)
+    return SimulationPlan(
+        tasks=tasks, workers=len(able), call_bytes=calls, why=why, result_bytes=size, minutes=minutes
+    )
 
 
 def _duration(minutes: float) -> str:

@@ -10,7 +10,7 @@ from bentray_kernels.tomography.solver_choice import undivided_reason
 
 from ...cluster.capacities import WorkerCapacity
 from ...files.dataset.counts import Summary
-from ..memory.ray_memory import ray_task_parts, shape_of
+from ..ray_sizes import ray_task_sizes, shape_of
 
 # Planes of a block, at least: with fewer most of a task would be planes of its neighbours.
 FEWEST_PLANES = 8
@@ -34,4 +34,4 @@ def fitting_blocks(scan: Summary, settings: Settings, capacities: Sequence[Worke
 
 def largest_bytes(scan: Summary, settings: Settings) -> int:
     """Memory of the largest task that traces rays or updates the image, bytes."""
-    return max(sum(parts.values()) for parts in ray_task_parts(scan, settings).values())
+    return max(size.bytes for size in ray_task_sizes(scan, settings).values())

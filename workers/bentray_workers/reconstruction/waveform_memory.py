@@ -1,6 +1,9 @@
 """Memory of the tasks of a full-waveform refinement, from the arrays of the kernels.
 
-Compared with measured peaks in ``tests/workers/reconstruction/memory/test_waveform_memory.py``.
+Formulas, and no fitted coefficients as of other tasks: the stored fields grow with the fourth power of the
+frequency. Sizes that can be measured in seconds take at most 30 MiB, of which resampled traces are most, so
+that a fit to them says nothing of the fields (it gave them no bytes). ``bentray bench task_memory`` judges
+them.
 """
 
 from __future__ import annotations
@@ -16,7 +19,7 @@ from bentray_kernels.tomography.waveform.waveform_settings import Band, WaveSett
 from bentray_kernels.wave.device_memory import ShotSize
 from bentray_kernels.wave.device_waves import PROCESSOR_EMITTERS
 
-from ...files.dataset.counts import Traces
+from ..files.dataset.counts import Traces
 
 # Overhead of Python in any task.
 FLOOR_BYTES = 13 * 2**20 // 2

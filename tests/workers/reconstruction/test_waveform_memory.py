@@ -1,4 +1,4 @@
-"""The planned memory of a waveform refinement is what its tasks use; it grows with the scan."""
+"""Planned memory of full waveforms: of every automatic choice, and more for larger scans."""
 
 from dataclasses import replace
 
@@ -16,34 +16,14 @@ from bentray_kernels.tomography.waveform.refinement_graph import evaluate_emitte
 from bentray_kernels.tomography.waveform.wave_scan import WaveScan
 from bentray_kernels.wave.device_waves import DeviceWaves, Scan
 from bentray_kernels.wave.simulation import place_elements
-from bentray_workers.cluster.capacities import MIB
 from bentray_workers.files.dataset import write_dataset
 from bentray_workers.files.dataset.counts import Traces
 from bentray_workers.files.dataset.scan import counts_in
-from bentray_workers.reconstruction.memory.waveform_memory import wave_task_bytes, wave_tasks
+from bentray_workers.reconstruction.waveform_memory import wave_task_bytes, wave_tasks
 
-from ....kernels.tomography.waveform.scans import CENTRE_HZ, ELEMENTS, RADIUS, RATE_HZ, WATER, scan
-from ....memory_program import measured, wrong
+from ...kernels.tomography.waveform.scans import CENTRE_HZ, ELEMENTS, RADIUS, RATE_HZ, WATER, scan
 
 SCAN = Traces(128, 128, 300, 4, 2.5e6, 2.5e5, 1500.0)
-
-
-@pytest.mark.slow
-@pytest.mark.nightly
-@pytest.mark.parametrize(
-    ("asked", "elements", "samples"),
-    # Each has its largest band last.
-    [
-        ({"bands": 2, "emitters": 16, "attenuation": False}, 64, 260),
-        ({"attenuation": False}, 128, 300),
-        ({"bands": 1}, 96, 300),
-    ],
-)
-def test_tasks_stay_within_the_planned_memory(asked, elements, samples):
-    taken = measured(f"{__package__}.wave_task_memory", asked, elements, samples)
-    traces = replace(SCAN, emissions=elements, receivers=elements, samples=samples)
-    told = wave_task_bytes(traces, 0.1, Settings.from_values(method="waveform", **asked))
-    assert not wrong(told, taken, 1.5, 4 * MIB)
 
 
 @given(
@@ -52,7 +32,7 @@ def test_tasks_stay_within_the_planned_memory(asked, elements, samples):
     samples=st.integers(300, 3000),
     width=st.floats(0.05, 0.3),
 )
-def test_planned_memory_is_monotonic(bands, emissions, samples, width):
+def test_planned_memory_of_waves_is_monotonic(bands, emissions, samples, width):
     traces = replace(SCAN, emissions=emissions, samples=samples)
     settings = Settings.from_values(method="waveform", bands=bands)
     found = wave_task_bytes(traces, width, settings)
@@ -89,13 +69,13 @@ def test_the_plan_holds_the_arrays_of_a_device():
     told = wave_task_bytes(
         replace(SCAN, emissions=12, receivers=ELEMENTS, samples=120), 2.0 * RADIUS, settings
     )
-    assert needed < told["evaluate_emitter"] < 4 * needed + 16 * MIB
+    assert needed < told["evaluate_emitter"] < 4 * needed + 16 * 2**20
     without = wave_task_bytes(SCAN, 0.1, settings.changed(device="cpu"))
     assert without == wave_task_bytes(SCAN, 0.1, settings.changed(device="auto"))
     assert without["evaluate_emitter"] < wave_task_bytes(SCAN, 0.1, settings)["evaluate_emitter"]
 
 
-def test_plan_covers_every_automatic_choice():
+def test_plan_of_waves_covers_every_automatic_choice():
     """It judges by waves where there are traces, and refines where it is given minutes."""
     auto = Settings(method="auto")
     judged = wave_task_bytes(SCAN, 0.1, auto)

@@ -1,1 +1,0 @@
-"""Memory of the tasks of a reconstruction, computed before they run."""
