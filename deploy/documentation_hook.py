@@ -5,8 +5,6 @@ are written: built ones of an earlier commit could lie in build/docs. A wheel th
 the pages of the sdist.
 """
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Software bill of materials of a release in CycloneDX 1.6: ``python deploy/sbom.py`` prints it as JSON."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

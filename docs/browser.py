@@ -1,7 +1,5 @@
 """A page of Debian's Chromium for the pictures of the documentation."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Sphinx configuration of the documentation; `make docs` treats warnings as errors."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

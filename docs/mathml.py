@@ -1,7 +1,5 @@
 """Sphinx extension: formulas as MathML, which browsers draw without scripts, fonts or another host."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from docutils import nodes

@@ -5,8 +5,6 @@ needs the tools for tests and documentation, Debian's Chromium and `pip install 
 files leave the last out: it would bring a hundred packages for one picture.
 """
 
-from __future__ import annotations
-
 import copy
 import io
 import re

@@ -1,7 +1,5 @@
 """Sphinx extension: notebooks of recipes name pages by their titles, as they cannot link to them."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any

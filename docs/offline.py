@@ -3,8 +3,6 @@
 So the service can serve them under its own content security policy, and they are complete without a network.
 """
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import os

@@ -4,8 +4,6 @@ Each in light and dark colours, on a laptop and on a telephone, to be looked at 
 They are not part of the documentation, whose pictures are made by `pictures.py`.
 """
 
-from __future__ import annotations
-
 import io
 import sys
 import tempfile

@@ -1,7 +1,5 @@
 """Sphinx extension: recipes of the gallery that simulate the same scan share it, to save time."""
 
-from __future__ import annotations
-
 import functools
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Jobs of all kinds whose memory is measured in workers; each returns the planned sizes of its tasks."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Callable, Mapping
 from functools import partial

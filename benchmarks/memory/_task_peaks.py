@@ -1,7 +1,5 @@
 """Peak memory of each task of a job in a worker process of its own, beside its plan."""
 
-from __future__ import annotations
-
 import ctypes
 import gc
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """Memory of tasks of all kinds and several sizes, each in a new worker process, beside their plans."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 
 from bentray_service.cli.output.benchmark_context import BenchmarkContext

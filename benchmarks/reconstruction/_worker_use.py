@@ -1,7 +1,5 @@
 """Peak memory of this process, to be called on a worker."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

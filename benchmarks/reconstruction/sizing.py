@@ -1,7 +1,5 @@
 """Sizing benchmark: memory, CPU time and disk space of reconstructions in a worker, beside their plans."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable
 from pathlib import Path

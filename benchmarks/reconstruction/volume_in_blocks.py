@@ -1,7 +1,5 @@
 """SART of a volume in blocks beside the whole volume: memory, time, difference and image error."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What a person waits for at the page beside *Best* and a geometry field on two workers, and without them."""
 
-from __future__ import annotations
-
 import os
 import threading
 import time

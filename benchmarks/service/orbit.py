@@ -1,7 +1,5 @@
 """Turning volumes and surface scenes: previews a second by requests and in the page, and pictures at rest."""
 
-from __future__ import annotations
-
 import io
 import os
 import time

@@ -1,7 +1,5 @@
 """Synthetic ring scans of smooth delays and pulses without a simulation, written to files for workers."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Tables of the pages from the code: most stand in the pages (`make tables`), one is made by Sphinx."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """The commands of `bentray` with their options, from the `--help` texts."""
 
-from __future__ import annotations
-
 import inspect
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Table of the numerical dispersion of the wave simulator, by nodes per wavelength."""
 
-from __future__ import annotations
-
 from bentray_kernels.wave.stencil import longest_step, phase_error
 
 from .tables import table

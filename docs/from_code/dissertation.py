@@ -1,7 +1,5 @@
 """The report on the dissertation's tables and figures from the recorded rows, as its command renders it."""
 
-from __future__ import annotations
-
 import sys
 from importlib import import_module
 from pathlib import Path

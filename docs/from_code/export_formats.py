@@ -1,7 +1,5 @@
 """The table of export formats."""
 
-from __future__ import annotations
-
 from bentray_workers.files.export.registry import FORMATS
 
 from .tables import table

@@ -1,7 +1,5 @@
 """Table and code of the head-to-head page: recorded rows, and the functions that made them."""
 
-from __future__ import annotations
-
 import ast
 import json
 from collections.abc import Sequence

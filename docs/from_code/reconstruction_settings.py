@@ -1,7 +1,5 @@
 """The settings of a reconstruction as a table, from the metadata of the settings themselves."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import fields
 

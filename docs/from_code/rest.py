@@ -1,7 +1,5 @@
 """The routes and records of the REST API, from its OpenAPI description."""
 
-from __future__ import annotations
-
 import functools
 import tempfile
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Table of the limits of scan files."""
 
-from __future__ import annotations
-
 from bentray_kernels.requests import limits
 from bentray_kernels.requests.ranges import Range
 

@@ -1,7 +1,5 @@
 """Sections of the formats of other programs, with their variables."""
 
-from __future__ import annotations
-
 from bentray_workers.foreign_scans.conversion import READERS
 
 from .tables import table

@@ -1,7 +1,5 @@
 """Table of the scoreboard, from its recorded rows."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Table of all environment variables: settings of the service, and those of clients and libraries."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from annotated_types import Ge, Gt, Le

@@ -1,7 +1,5 @@
 """Tables of memory, disk space and processor time of reconstructions: planned, and measured."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Markdown tables with escaped cells."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 

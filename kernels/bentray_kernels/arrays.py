@@ -1,7 +1,5 @@
 """Array types of signatures, and the refusal of masked arrays."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """Task graphs of pipelines, and the one loop that runs them: submit, poll, cancel, retry, checkpoint."""
 
-from __future__ import annotations
-
 import os
 from collections import deque
 from collections.abc import Callable, Mapping

@@ -1,7 +1,5 @@
 """The ASGI application: opens the parts of the service in order, and closes them in reverse order."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import AsyncIterator
 from contextlib import ExitStack, asynccontextmanager

@@ -1,7 +1,5 @@
 """Parts of the service that work in a thread of their own until it stops."""
 
-from __future__ import annotations
-
 import logging
 import threading
 from typing import ClassVar

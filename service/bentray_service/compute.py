@@ -1,7 +1,5 @@
 """The Dask cluster of the service: workers, and plans of jobs."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import replace

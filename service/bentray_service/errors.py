@@ -1,7 +1,5 @@
 """Errors of the service with the field, the value found, the values accepted, and their type of problem."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar

@@ -12,8 +12,6 @@ the container, and the engine restarts it: engines themselves only mark a contai
 Containers run it every few seconds, so it imports the standard library only.
 """
 
-from __future__ import annotations
-
 import http.client
 import json
 import os

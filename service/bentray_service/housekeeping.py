@@ -1,7 +1,5 @@
 """Periodic deletion of expired uploads, old data, old audit files and orphaned files."""
 
-from __future__ import annotations
-
 import logging
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Records and figures as small tables in HTML, for notebooks."""
 
-from __future__ import annotations
-
 import base64
 import html
 from collections.abc import Iterable, Sequence

@@ -1,7 +1,5 @@
 """Log formatters for text and JSON, with request and job ids and without secrets."""
 
-from __future__ import annotations
-
 import json
 import logging
 import re

@@ -1,7 +1,5 @@
 """Print the OpenAPI description: ``python -m bentray_service.openapi > openapi.json``."""
 
-from __future__ import annotations
-
 import json
 import sys
 

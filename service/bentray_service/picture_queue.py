@@ -1,7 +1,5 @@
 """The queue of rendering tasks: one task per worker at a time, accounts take turns, limited waiting time."""
 
-from __future__ import annotations
-
 import asyncio
 import math
 import time

@@ -1,7 +1,5 @@
 """Rendering of images and export of files on workers, with time limits and cancellation."""
 
-from __future__ import annotations
-
 import asyncio
 import errno
 import hashlib

@@ -1,7 +1,5 @@
 """The readiness check, in a thread of its own with a time limit."""
 
-from __future__ import annotations
-
 import asyncio
 import shutil
 from collections.abc import Mapping

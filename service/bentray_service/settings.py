@@ -1,7 +1,5 @@
 """The settings of the service: environment variables with the prefix BENTRAY_."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Settings of a request: every name known, every value of its type, errors with the name of the setting."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import fields, is_dataclass
 from difflib import get_close_matches

@@ -1,7 +1,5 @@
 """Three records of what a running service consists of, and the context that gives them to routes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated, cast
 

@@ -4,8 +4,6 @@ An edge is visible in transmission where a path runs along it; edges in the miss
 (limited angle).
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Convex hull of an array: the nodes and places inside it, farther than a rim from its faces and elements."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

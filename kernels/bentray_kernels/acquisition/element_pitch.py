@@ -1,7 +1,5 @@
 """The pitch of an array: the distance of neighbouring elements."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..arrays import Floats

@@ -1,7 +1,5 @@
 """Travel times that no sound can have, in which other programs write missing ones: they become NaN."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Noise of travel times: added to simulated data, estimated in measured data."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

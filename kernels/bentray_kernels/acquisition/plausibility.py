@@ -1,7 +1,5 @@
 """Plausibility of a scan: width of the array, travel times against distances, and the order of elements."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..arrays import Flags, Floats

@@ -1,7 +1,5 @@
 """Centre frequency and bandwidth of the pulse, from the spectra of traces."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Straight line through points with outliers."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..arrays import Floats

@@ -1,7 +1,5 @@
 """Validation rules for the fields of a dataset; each raises InvalidInput with the name in the file format."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

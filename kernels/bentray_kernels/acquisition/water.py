@@ -1,7 +1,5 @@
 """Speed of sound in pure water from its temperature, and back."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Atomic counters in compiled kernels, for threads that share the work of one kernel."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from numba import types

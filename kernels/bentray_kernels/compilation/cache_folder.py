@@ -1,7 +1,5 @@
 """Folders of what is kept between runs: another one takes the place of a folder that cannot be written."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import stat

@@ -1,7 +1,5 @@
 """Events of Numba while it compiles: counts for progress, and one process at a time for each kernel."""
 
-from __future__ import annotations
-
 import fcntl
 import gc
 import os

@@ -1,7 +1,5 @@
 """Single precision and 32-bit integers for compiled lookups: vectors hold more of them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Digests for the compile cache: of a kernel's module and of all modules of the package that it imports."""
 
-from __future__ import annotations
-
 import ast
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """Threads that share the planes of one grid; compiled kernels and NumPy release the GIL."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager

@@ -4,8 +4,6 @@
 ``{"engine", "fault", "timings"}``: see ``opencl.device_benchmark``. A device that ends the process omits it.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import sys

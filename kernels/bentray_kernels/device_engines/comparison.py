@@ -1,7 +1,5 @@
 """Comparison of engines on the device with compiled code, in one run: time, share of bandwidth, error."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from typing import NamedTuple

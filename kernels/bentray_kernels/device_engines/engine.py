@@ -1,7 +1,5 @@
 """One problem that an OpenCL device and compiled code both solve."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """The example problems of each engine, for the table of a device and for its benchmark."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from functools import cache

@@ -1,7 +1,5 @@
 """The default solver: factored second order, without a heap, in the order of a cheaper solution."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -10,8 +10,6 @@ It is designed for tissue, whose slowness varies by tens of per cent, and for sp
 slowness is relative to s0, and float32 resolves u to a few ten-thousandths of a node's crossing time.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

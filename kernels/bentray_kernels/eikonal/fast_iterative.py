@@ -1,7 +1,5 @@
 """The fast iterative method: an active list instead of a heap (Jeong & Whitaker 2008; chapter 7.2.2)."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The fast iterative method on an OpenCL device, or on the CPU where no device passes its self-test."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

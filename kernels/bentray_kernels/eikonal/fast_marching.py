@@ -1,7 +1,5 @@
 """Fast marching with a binary min-heap and back pointers, plain or factored (Sethian 1996; chapter 6.2.2)."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

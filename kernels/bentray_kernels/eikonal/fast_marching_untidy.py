@@ -1,7 +1,5 @@
 """Fast marching with an untidy queue: O(N) for a bounded error (Yatziv, Bartesaghi & Sapiro 2006)."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -8,8 +8,6 @@ In space several threads can share a solve. In a sweep, as soon as some diagonal
 done, the next block may follow on them; the grids are filled and copied in groups of planes.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from typing import NamedTuple

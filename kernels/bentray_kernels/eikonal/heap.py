@@ -5,8 +5,6 @@ Three arrays: ``heap`` holds nodes, ``keys`` their times, and ``place`` the posi
 the number of entries and return the new one.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

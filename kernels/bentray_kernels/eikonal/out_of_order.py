@@ -6,8 +6,6 @@ empties as it reaches those times. So each final time is computed from earlier f
 marching, and no node is earlier than all of its neighbours.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Eikonal methods by name, and ``solve`` and ``solve_many``."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor

@@ -5,8 +5,6 @@ round updates all nodes. It is the published way to use several cores; threads t
 faster (``fast_sweeping``).
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 

@@ -1,7 +1,5 @@
 """Fast sweeping by domain decomposition: blocks without shared memory exchange halos until convergence."""
 
-from __future__ import annotations
-
 import functools
 import itertools
 import math

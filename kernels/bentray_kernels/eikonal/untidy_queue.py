@@ -7,8 +7,6 @@ each node, or ``FAR`` or ``DONE`` as in ``heap``. Node 0 lies in the border, is 
 list.
 """
 
-from __future__ import annotations
-
 from ..compilation.compiled import int64, kernel
 from .heap import DONE, FAR, Nodes
 

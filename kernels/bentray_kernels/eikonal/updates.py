@@ -5,8 +5,6 @@ axes has 0 for the third, whose neighbour is then the node itself and never sett
 the final times and infinity elsewhere, so an unknown neighbour drops out of every minimum by itself.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Approximate continuous cell classification: each coefficient times the extremes of its weight (4.3.2.3)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..arrays import Floats

@@ -1,7 +1,5 @@
 """The Bernstein-Bézier form of a cell: the convex hull of its coefficients bounds the values of the cell."""
 
-from __future__ import annotations
-
 import math
 
 from ..arrays import Floats

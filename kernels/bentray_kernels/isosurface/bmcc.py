@@ -1,7 +1,5 @@
 """Binary morphologic cell classification: the range of the coefficients that reach a cell (4.3.2.1)."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Continuous cell classification: the exact range of a cell, from its critical points (4.3.2.2)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..arrays import Floats

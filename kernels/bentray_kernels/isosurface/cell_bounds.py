@@ -1,7 +1,5 @@
 """Range of the field within every cell, by a selectable bound."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Weights of a filter within one cell: nodes, polynomials, ranges and Bernstein form."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Ray intersection with iso-surfaces: the first point at which the field along a ray leaves an interval."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

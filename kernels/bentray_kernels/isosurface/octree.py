@@ -1,7 +1,5 @@
 """Octree over the cells: the iso-values that each node may contain, from the ranges of its cells."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Roots of the field along a ray: Brent's method, and the cubic of a trilinear cell."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

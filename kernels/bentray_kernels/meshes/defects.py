@@ -1,7 +1,5 @@
 """Mesh repair: defects are corrected where that is unambiguous, else the mesh is rejected."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

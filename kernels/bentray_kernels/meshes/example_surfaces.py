@@ -1,7 +1,5 @@
 """Example meshes: a sphere, a torus, and a bumpy ball with any number of faces."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

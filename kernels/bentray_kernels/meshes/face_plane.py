@@ -1,7 +1,5 @@
 """Intersection of a ray with the plane of a face, and the neighbour on the side of the point."""
 
-from __future__ import annotations
-
 from ..arrays import Float32s, Int32s
 from ..compilation.compiled import kernel
 from ..compilation.float32 import lower, real

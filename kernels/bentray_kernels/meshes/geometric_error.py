@@ -1,7 +1,5 @@
 """Geometric error: symmetric distance between two surfaces."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

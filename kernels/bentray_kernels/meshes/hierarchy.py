@@ -4,8 +4,6 @@ MacDonald and Booth, Heuristics for ray tracing using space subdivision (1990); 
 construction of SAH-based bounding volume hierarchies (2007).
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

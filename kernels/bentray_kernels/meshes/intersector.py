@@ -5,8 +5,6 @@ Watertight ray/triangle intersection, 2013). On which side of it an edge passes 
 two products, which rounding may turn to 0 but not around; so no ray slips between two faces.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """Iso-surfaces as triangle meshes, by marching tetrahedra."""
 
-from __future__ import annotations
-
 from itertools import permutations
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Cutting meshes along edges: both sides of a cut get separate vertices."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The connected pieces of a mesh."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .mesh import TriangleMesh

@@ -1,7 +1,5 @@
 """Repairs of triangles: corners that nearly agree, faces without area, faces listed twice."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

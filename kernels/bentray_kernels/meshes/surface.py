@@ -1,7 +1,5 @@
 """A mesh for ray intersection: triangles in the order of a bounding volume hierarchy, with neighbours."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Exact distance from points to a surface, by a grid of its triangles."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Mesh topology: edges, boundary loops, pieces, Euler characteristic, genus."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import overload

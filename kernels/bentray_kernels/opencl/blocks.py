@@ -1,7 +1,5 @@
 """Fast iterative travel times on an OpenCL device: blocks of points, many problems per launch."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 

@@ -1,7 +1,5 @@
 """Tests of a device in a child process, because drivers may abort, hang or compute wrong results."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

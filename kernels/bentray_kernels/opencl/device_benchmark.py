@@ -1,7 +1,5 @@
 """Benchmark of a device: the time of an engine on it beside compiled code, cached as the self-test is."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass

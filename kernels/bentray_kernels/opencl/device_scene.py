@@ -1,7 +1,5 @@
 """A scene in the memory of a device, and compiled code in its place where the self-test fails."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable
 from typing import Any, ClassVar, Self

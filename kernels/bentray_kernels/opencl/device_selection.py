@@ -1,7 +1,5 @@
 """The OpenCL device of the kernels: selected or best, tested and open; or none, with one warning."""
 
-from __future__ import annotations
-
 import os
 import threading
 import warnings

@@ -1,7 +1,5 @@
 """The OpenCL devices of this machine, and their selection by the user."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from contextlib import suppress

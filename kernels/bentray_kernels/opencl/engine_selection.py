@@ -1,7 +1,5 @@
 """Where an engine computes, on the OpenCL device or in compiled code: the one place that decides it."""
 
-from __future__ import annotations
-
 import logging
 import os
 import threading

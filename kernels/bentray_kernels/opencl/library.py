@@ -1,7 +1,5 @@
 """The shared library of an OpenCL driver, and the Python package that contains it."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 from collections.abc import Iterator

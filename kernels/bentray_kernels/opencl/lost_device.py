@@ -1,7 +1,5 @@
 """A device that fails while it computes: a clean error, and the same computed once more on the CPU."""
 
-from __future__ import annotations
-
 import logging
 import threading
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """The OpenCL platforms of this process: those of the system and of Python packages."""
 
-from __future__ import annotations
-
 import os
 import tempfile
 import threading

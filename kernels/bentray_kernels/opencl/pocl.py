@@ -11,8 +11,6 @@ PoCL also starts the system's linker once a kernel, with the libraries of a C co
 (a slim container) gets the linker in ``link/``, by the variable in which PoCL's compiler looks for programs.
 """
 
-from __future__ import annotations
-
 import ctypes
 import os
 import shutil

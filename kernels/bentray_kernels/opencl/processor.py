@@ -1,7 +1,5 @@
 """Model and features of this machine's processor, from /proc/cpuinfo."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A program for OpenCL devices: source files and the macros that the compiler gets with them."""
 
-from __future__ import annotations
-
 import re
 from functools import cache
 from importlib import resources

@@ -1,7 +1,5 @@
 """Records about a device in the cache folder: read if they are whole, replaced atomically."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import platform

@@ -5,8 +5,6 @@
 the line.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import sys

@@ -1,7 +1,5 @@
 """Result of the self-test of a device, cached while driver, processor and program are unchanged."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass

@@ -1,7 +1,5 @@
 """Cell averages of a plane through solids; cells are supersampled only at boundaries."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

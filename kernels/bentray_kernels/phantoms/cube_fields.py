@@ -1,7 +1,5 @@
 """Analytic fields over the cube from −1 to 1, and volumes sampled from them."""
 
-from __future__ import annotations
-
 from typing import Any, Protocol
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Glass balls: a sphere with a Gaussian fringe and air holes."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The Marschner–Lobb test signal for interpolation filters."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Solids of 3-D phantoms: ellipsoids, and bodies whose outline varies along z."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Protocol

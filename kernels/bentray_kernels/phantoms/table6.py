@@ -1,7 +1,5 @@
 """The 2-D breast phantoms of Li 2008, Table 6: a thick fat layer around tissue with lesions; two slices."""
 
-from __future__ import annotations
-
 from .ellipses import Ellipse, EllipsePhantom, HalfEllipse
 
 FAT_MPS, TISSUE_MPS, LARGE_MPS, SMALL_MPS = 1375.0, 1475.0, 1560.0, 1530.0

@@ -1,7 +1,5 @@
 """The 3-D breast phantom (Li 2008, Table 7): skin, fat, tissue and lesions that vary between slices."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..arrays import Floats

@@ -11,8 +11,6 @@ neighbours: each step factorises one block tridiagonal matrix. Terms that mix th
 point with the shift of another are neglected. Lengths are in nodes and times are slowness times nodes.
 """
 
-from __future__ import annotations
-
 import math
 
 from ..arrays import Floats

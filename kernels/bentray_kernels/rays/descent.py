@@ -5,8 +5,6 @@ Positions are in nodes (metres divided by the spacing) and arrays are flat. The 
 ∇T changes sign there. ``path`` and ``scratch`` come from ``empty_path``.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

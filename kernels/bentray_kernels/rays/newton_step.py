@@ -1,7 +1,5 @@
 """Newton step of ray bending: block tridiagonal Hessian of the travel time, its elimination and solution."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

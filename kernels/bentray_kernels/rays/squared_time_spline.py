@@ -1,7 +1,5 @@
 """B-spline of the squared travel time, whose gradient guides rays between the nodes (chapter 6.3)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..arrays import Floats

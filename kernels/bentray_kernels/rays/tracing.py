@@ -1,7 +1,5 @@
 """Paths of the rays of one source."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

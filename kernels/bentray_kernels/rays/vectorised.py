@@ -4,8 +4,6 @@ The steps of one ray depend on each other; those of different rays do not, and f
 Positions are in nodes. The gradient of the travel time is ∇r + ∇u, see ``eikonal.deviation``.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Cameras: the ray of each position in the image."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

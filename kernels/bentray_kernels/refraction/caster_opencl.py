@@ -1,7 +1,5 @@
 """The ray caster on an OpenCL device: the same rays as ``caster.cast``, one work-item per ray."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

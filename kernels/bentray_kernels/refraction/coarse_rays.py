@@ -1,7 +1,5 @@
 """Pictures from fewer rays than pixels: where rays end is interpolated between them, for fast previews."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

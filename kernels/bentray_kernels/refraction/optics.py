@@ -1,7 +1,5 @@
 """Refraction and reflection at smooth interfaces: Snell's law, total reflection and Fresnel weights."""
 
-from __future__ import annotations
-
 import math
 
 from ..arrays import Vector

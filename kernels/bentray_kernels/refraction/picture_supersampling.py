@@ -1,7 +1,5 @@
 """Post-refraction supersampling of interpolated pictures, which refines every pixel (4.3.3)."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -5,8 +5,6 @@ procedure": a ray is intersected with the height field, and its place on the fla
 and supersampled as on a plane.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

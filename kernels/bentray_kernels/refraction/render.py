@@ -1,7 +1,5 @@
 """Refractive rendering of a volume before a backdrop."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass

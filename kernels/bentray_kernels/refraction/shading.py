@@ -1,7 +1,5 @@
 """Phong shading of the opaque surface, without refraction."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass

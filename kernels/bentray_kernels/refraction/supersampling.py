@@ -1,7 +1,5 @@
 """Supersampling: pixel colours by point sampling, post-refraction or real supersampling (4.3.3)."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Packed texels: an interpolated picture with the three channels of a texel in one number."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

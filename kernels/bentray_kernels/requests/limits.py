@@ -4,8 +4,6 @@ The largest ultrasound tomographs have 2,304 elements that move to ten places (2
 pairs), or rings of 2,048 elements at some 60 heights (2.5e8 pairs), and record some 4,000 samples a trace.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

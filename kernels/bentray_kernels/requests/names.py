@@ -1,7 +1,5 @@
 """Names of methods and engines that users may choose; without an import of their compiled code."""
 
-from __future__ import annotations
-
 from typing import Literal, get_args
 
 # Eikonal solvers of reconstructions. ``deviation`` solves for the difference from straight rays; the others

@@ -1,7 +1,5 @@
 """The range of a number, declared once with its field and checked once where the number enters."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any

@@ -1,7 +1,5 @@
 """Limits of refractive renderings and geometry fields, free of compiled code."""
 
-from __future__ import annotations
-
 # Samples of a geometry field along an edge of the cube, and of the textures of reference. Those of the
 # dissertation end at 24, where the table of reference takes 96 MB; at 48 a table has 191 million entries, and
 # that of reference 1.5 GB.

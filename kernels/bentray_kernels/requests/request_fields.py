@@ -1,7 +1,5 @@
 """Fields of a request: description, range and choices, declared once and checked in every interface."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Interpolation filters: nodes and polynomial weights of a point."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from fractions import Fraction

@@ -1,7 +1,5 @@
 """SIMD code generation for filters: fully unrolled LLVM vector instructions, one lane per node."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

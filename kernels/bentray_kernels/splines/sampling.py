@@ -1,7 +1,5 @@
 """Value and gradient of a filtered grid at one point, for compiled code."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -3,8 +3,6 @@
 Experimental: see ``EXPERIMENTAL``.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """SART of the attenuation along the rays of the finished speed image (chapter 6.3, phase two)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

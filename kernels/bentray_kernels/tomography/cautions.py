@@ -1,7 +1,5 @@
 """Doubts about a finished image: cut off by the speed bounds, or travel times that it does not explain."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Checkpoint format: the state of a task graph as JSON and arrays, and back, bit for bit."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from types import MappingProxyType

@@ -1,7 +1,5 @@
 """Slices or a volume where the settings leave it open: from the heights of the elements."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np

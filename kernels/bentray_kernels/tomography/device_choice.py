@@ -1,7 +1,5 @@
 """Whether a reconstruction with ``device: auto`` computes on an OpenCL device, decided before it begins."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

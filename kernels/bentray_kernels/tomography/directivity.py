@@ -1,7 +1,5 @@
 """Directivity of the elements: pairs whose path lies within the opening angle at both ends."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

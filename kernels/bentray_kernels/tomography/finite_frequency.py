@@ -1,7 +1,5 @@
 """Finite-frequency (fat) rays: blurring of the image for travel times and for the bending of rays."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Focusing: the effect of refraction on amplitudes, which is subtracted before the attenuation is solved."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

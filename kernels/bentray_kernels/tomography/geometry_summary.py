@@ -1,7 +1,5 @@
 """Sentences about the geometry of a reconstruction: decomposition, pairs left out or leaving, directions."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Stages of a reconstruction: coarser grids before the requested one."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Training and held-out parts of the emitter-receiver pairs of a scan."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Literal
 

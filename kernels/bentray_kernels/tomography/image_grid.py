@@ -1,7 +1,5 @@
 """Nodes of the image where the settings leave them open: from aperture, elements, wavelength and noise."""
 
-from __future__ import annotations
-
 import math
 
 # Nodes lie half an element's pitch apart, the finest detail that the rays of a ring sample, and never closer

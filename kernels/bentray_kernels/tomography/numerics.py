@@ -1,7 +1,5 @@
 """Numerical parameters of a reconstruction: decided automatically, fixed by benchmarks and tests."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import asdict, dataclass
 from typing import Literal

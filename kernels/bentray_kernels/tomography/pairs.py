@@ -1,7 +1,5 @@
 """Emitters, receivers and data of one problem: a slice, a ring among rings, or the whole array."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

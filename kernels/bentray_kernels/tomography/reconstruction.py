@@ -1,7 +1,5 @@
 """Reconstruction of a dataset: model selection, task graphs, optional refinement, assembled result."""
 
-from __future__ import annotations
-
 import platform
 from collections.abc import Callable, Sequence
 from dataclasses import replace

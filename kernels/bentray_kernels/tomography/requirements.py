@@ -1,7 +1,5 @@
 """Requirements of settings on a scan that its header shows: checked first, without compiled code."""
 
-from __future__ import annotations
-
 from ..acquisition.array_hull import check_extent
 from ..acquisition.dataset import Dataset
 from ..errors import InvalidInput

@@ -1,7 +1,5 @@
 """Resolution check: recovery of a checkerboard along the rays of a finished image."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Result of a reconstruction: images, history, settings and provenance."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple

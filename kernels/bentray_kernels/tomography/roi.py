@@ -1,7 +1,5 @@
 """The region of interest of a dataset, read at the nodes of an image."""
 
-from __future__ import annotations
-
 from functools import reduce
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A scan as tasks see it: where its data are, and the problems that a process makes of them once."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from functools import cache

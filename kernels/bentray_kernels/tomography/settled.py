@@ -1,7 +1,5 @@
 """Everything automatic, decided in one place before the first task: each value with its reason."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import NamedTuple, Protocol
 

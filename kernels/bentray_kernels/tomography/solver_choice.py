@@ -1,7 +1,5 @@
 """Which solver a reconstruction runs: decided here for those that run it, plan it and report it."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from ..eikonal import METHODS

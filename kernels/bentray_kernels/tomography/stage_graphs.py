@@ -1,7 +1,5 @@
 """Task graphs of one stage of a reconstruction: SART or Gauss-Newton on one grid."""
 
-from __future__ import annotations
-
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Sequence

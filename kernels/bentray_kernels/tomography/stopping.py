@@ -1,7 +1,5 @@
 """The noise of travel times, and the misfit at which a reconstruction has explained them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """Settings as stored in jobs and result files, also by earlier versions, read as those of today."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any

@@ -1,7 +1,5 @@
 """Adjoint-state gradient: derivative of a misfit by speed or loss at every node."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """Arrays whose rows begin on cache lines: vector loads that cross two of them take twice as long."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Batches of shots on an OpenCL device: time loops forwards and backwards, without host round trips."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import Any

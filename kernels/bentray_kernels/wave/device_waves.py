@@ -1,7 +1,5 @@
 """A medium and its receivers on an OpenCL device, and how many emitters it has in batch."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from itertools import pairwise

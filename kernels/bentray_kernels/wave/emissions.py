@@ -1,7 +1,5 @@
 """Traces and gradients of many emissions of one scan, by compiled code or on an OpenCL device."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Literal, NamedTuple

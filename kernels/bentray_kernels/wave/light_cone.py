@@ -1,7 +1,5 @@
 """Nodes that matter at each time step: reached by the source, and still able to reach a receiver in time."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

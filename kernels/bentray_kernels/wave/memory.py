@@ -1,7 +1,5 @@
 """Memory of the simulation of one emission, estimated before it is allocated."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """Sources and receivers between nodes: Kaiser-windowed sinc interpolation."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

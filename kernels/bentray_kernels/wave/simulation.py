@@ -1,7 +1,5 @@
 """Forward simulation of one emitter: pressure traces, and the wave field for a gradient."""
 
-from __future__ import annotations
-
 from typing import Any, Literal
 
 import numpy as np

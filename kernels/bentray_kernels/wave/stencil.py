@@ -1,7 +1,5 @@
 """The finite-difference Laplacian: weights, longest stable time step, numerical dispersion."""
 
-from __future__ import annotations
-
 import math
 from fractions import Fraction
 from typing import Literal

@@ -1,7 +1,5 @@
 """Time steps of a simulation in blocks, between which it can be cancelled."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 
 # Nodes times steps of a block: a fraction of a second, so that the cost of a poll is negligible.

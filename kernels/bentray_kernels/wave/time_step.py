@@ -1,7 +1,5 @@
 """The compiled finite-difference time step, point sources and receivers."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from ..compilation.compiled import kernel

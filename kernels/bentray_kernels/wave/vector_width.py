@@ -1,7 +1,5 @@
 """The widest vectors of the processor for a compiled kernel, where LLVM would take half of it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from numba import types

@@ -1,7 +1,5 @@
 """The audit log: one line of JSON per request, one file per day."""
 
-from __future__ import annotations
-
 import json
 import logging
 import os

@@ -1,7 +1,5 @@
 """Sign-in of browsers at an OpenID provider (authorization code flow with PKCE), and their sessions."""
 
-from __future__ import annotations
-
 import logging
 import re
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """The authenticated caller of a request: tenant and scopes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType

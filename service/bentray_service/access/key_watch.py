@@ -1,7 +1,5 @@
 """Ends requests in progress when their key, session or membership ends, polling the database."""
 
-from __future__ import annotations
-
 import asyncio
 import logging
 from collections.abc import Callable, Iterator, Sequence

@@ -6,8 +6,6 @@ Authlib are not used: they read answers without a bound, and keys again for ever
 References: OpenID Connect Core 1.0 and Discovery 1.0; RFC 7636 (PKCE); RFC 9207 (issuer in the response).
 """
 
-from __future__ import annotations
-
 import json
 import logging
 import threading

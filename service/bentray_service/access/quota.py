@@ -1,7 +1,5 @@
 """Storage quotas: space is reserved before work begins."""
 
-from __future__ import annotations
-
 import logging
 import os
 import secrets

@@ -1,7 +1,5 @@
 """Rate limits of accounts and addresses: a token bucket for each, with the capacity of one minute."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable

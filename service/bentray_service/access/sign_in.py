@@ -1,7 +1,5 @@
 """Authentication of requests by API key, trusted proxy or session, before the body is read."""
 
-from __future__ import annotations
-
 import logging
 import math
 import time

@@ -1,7 +1,5 @@
 """The folder of a backup: its files, their checksums, and the description that makes it complete."""
 
-from __future__ import annotations
-
 import fcntl
 import hashlib
 import json

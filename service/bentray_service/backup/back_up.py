@@ -4,8 +4,6 @@ Stored files never change, so the order makes the backup consistent: first the d
 the files that its rows name. If one of them is deleted in between, the database is copied again.
 """
 
-from __future__ import annotations
-
 import json
 import secrets
 import shutil

@@ -3,8 +3,6 @@
 The database comes last, so that an interrupted restoration is never taken for a service; it can be continued.
 """
 
-from __future__ import annotations
-
 import json
 import shutil
 from collections.abc import Callable

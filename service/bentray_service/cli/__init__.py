@@ -1,7 +1,5 @@
 """The `bentray` command: a file for each subcommand or a few that belong together, with lazy imports."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable
 from typing import Annotated, Any

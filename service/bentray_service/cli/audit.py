@@ -1,7 +1,5 @@
 """`bentray audit`: show the audit log of a service."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Iterator
 from datetime import UTC, datetime

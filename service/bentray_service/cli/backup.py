@@ -1,7 +1,5 @@
 """`bentray backup`, `bentray restore` and `bentray verify`: copies of a service, and checks of its files."""
 
-from __future__ import annotations
-
 from collections import Counter
 from contextlib import closing
 from dataclasses import asdict

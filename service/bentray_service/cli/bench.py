@@ -1,7 +1,5 @@
 """`bentray bench`: run one benchmark of `benchmarks/` and write its rows."""
 
-from __future__ import annotations
-
 import importlib
 import sys
 from collections.abc import Callable, Iterable, Sequence

@@ -1,7 +1,5 @@
 """`bentray convert` and `bentray correct`: dataset files of scans of other programs, or with wrong units."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Any
 

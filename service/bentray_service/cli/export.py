@@ -1,7 +1,5 @@
 """`bentray export` and `bentray download`: write a result in the format of another program, or get one."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 from typing import Annotated, Any

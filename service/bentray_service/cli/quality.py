@@ -1,7 +1,5 @@
 """`bentray quality`: check the data quality of a scan."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Any, Literal
 

@@ -1,7 +1,5 @@
 """A temporary service: `bentray serve` in a child process."""
 
-from __future__ import annotations
-
 import json
 import os
 import select

@@ -1,7 +1,5 @@
 """`bentray webhooks`: secrets that sign messages to webhooks, and the messages."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, Literal
 
 import typer

@@ -1,7 +1,5 @@
 """`bentray worker`: run workers for a Dask scheduler."""
 
-from __future__ import annotations
-
 import json
 import os
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The flow of an upload with tus, continued after broken connections."""
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Flows that wait: for a job, by its event stream or by polling, and for a batch."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 

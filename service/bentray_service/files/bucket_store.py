@@ -1,7 +1,5 @@
 """The store that the settings select: the data folder, or a bucket with the data folder as a cache of it."""
 
-from __future__ import annotations
-
 import errno
 import logging
 import os

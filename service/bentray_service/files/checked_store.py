@@ -1,7 +1,5 @@
 """A store that verifies checksums, so that damaged files are never served; verification of all files."""
 
-from __future__ import annotations
-
 import errno
 import logging
 import threading

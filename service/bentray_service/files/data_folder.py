@@ -1,7 +1,5 @@
 """The data folder: folders of tenants, scratch space, audit log and lock; and its database."""
 
-from __future__ import annotations
-
 import fcntl
 import json
 import logging

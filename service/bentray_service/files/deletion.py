@@ -1,7 +1,5 @@
 """Deletion of stored items with everything derived from them: rows first, then files."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Collection, Iterator
 

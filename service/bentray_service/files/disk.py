@@ -1,7 +1,5 @@
 """Files on disk: usage, removal, digests, permissions, and packing of folders."""
 
-from __future__ import annotations
-
 import hashlib
 import logging
 import os

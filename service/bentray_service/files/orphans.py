@@ -1,7 +1,5 @@
 """Orphaned files, i.e. files without a row in the database: detection and removal."""
 
-from __future__ import annotations
-
 import logging
 import time
 from collections.abc import Callable

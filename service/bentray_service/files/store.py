@@ -1,7 +1,5 @@
 """The store, which keeps the files of tenants permanently: the data folder itself, and its interface."""
 
-from __future__ import annotations
-
 import errno
 import os
 from collections.abc import Callable, Collection

@@ -1,7 +1,5 @@
 """Paths of the files of one tenant, built from validated ids only."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Collection, Iterator
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """Conversion of an uploaded file, or a corrected copy of a stored scan, to a canonical file in its place."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The ingest queue: accounts take turns; uploads of one account are processed in order."""
 
-from __future__ import annotations
-
 import threading
 from collections import Counter, deque
 from collections.abc import Callable

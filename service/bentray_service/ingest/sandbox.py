@@ -1,7 +1,5 @@
 """Runs the ingest process in a sandbox: separate process group, time limit, validated output."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import logging

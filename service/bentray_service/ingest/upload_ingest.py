@@ -1,7 +1,5 @@
 """Ingestion of complete resumable uploads in the background; limits of concurrent and of new uploads."""
 
-from __future__ import annotations
-
 import contextlib
 import logging
 import os

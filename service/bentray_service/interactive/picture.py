@@ -1,7 +1,5 @@
 """A picture as bytes that a notebook shows."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A scan that was read or simulated: a dataset file, with its description in memory."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import weakref

@@ -5,8 +5,6 @@ there are any, the jobs of other classes tell how fast this machine is, and unti
 speed of another machine gives the order of magnitude; a class without such a speed has no estimate.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from statistics import median

@@ -1,7 +1,5 @@
 """Job events for all event streams, polled from the database by one thread."""
 
-from __future__ import annotations
-
 import asyncio
 import logging
 from collections import Counter

@@ -1,7 +1,5 @@
 """The base class of job kinds: request model, inputs, plan, execution and results."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from pathlib import Path

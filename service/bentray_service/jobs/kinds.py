@@ -1,7 +1,5 @@
 """The kinds of job: reconstruction, simulation, refraction and geometry field, each declared once."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from pathlib import Path

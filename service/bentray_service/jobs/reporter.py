@@ -1,7 +1,5 @@
 """Progress of a running job, stored at a limited rate, and the problem of a failed one."""
 
-from __future__ import annotations
-
 import errno
 import logging
 import secrets

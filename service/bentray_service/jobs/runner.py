@@ -1,7 +1,5 @@
 """The job runner: claims queued jobs, runs each in a thread, and stores the outcome."""
 
-from __future__ import annotations
-
 import errno
 import logging
 import shutil

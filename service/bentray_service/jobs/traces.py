@@ -4,8 +4,6 @@ Spans of requests are FastAPI's, spans of tasks those of ``bentray_workers.clust
 extra ``otel`` and an OTLP endpoint in the environment, all of them do nothing.
 """
 
-from __future__ import annotations
-
 import os
 import threading
 from collections import OrderedDict

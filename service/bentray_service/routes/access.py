@@ -1,7 +1,5 @@
 """/v1/access: identity, permissions, storage and keys of the caller."""
 
-from __future__ import annotations
-
 from datetime import datetime
 from typing import Literal
 

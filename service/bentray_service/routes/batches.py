@@ -1,7 +1,5 @@
 """/v1/batches: reconstruct many scans, with one progress; cancel and delete them together."""
 
-from __future__ import annotations
-
 import logging
 from typing import Annotated, Literal
 

@@ -1,7 +1,5 @@
 """Request parameters and bodies: list limits, accepted media types, and a size limit for JSON."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Coroutine
 from typing import Annotated, Any
 

@@ -1,7 +1,5 @@
 """/v1/datasets: upload, list, download, examine, name, correct and delete scans."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Annotated, Any, Literal
 from urllib.parse import urlencode

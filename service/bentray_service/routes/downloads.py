@@ -1,7 +1,5 @@
 """Resumable file downloads: ETag, Range and file name."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import re

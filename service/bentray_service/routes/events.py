@@ -1,7 +1,5 @@
 """/v1/jobs/{id}/events and /v1/events: state and progress of jobs as server-sent events."""
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import AsyncIterator, Callable

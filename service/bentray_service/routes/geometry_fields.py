@@ -1,7 +1,5 @@
 """/v1/geometry-fields: list geometry fields, show their metrics and images."""
 
-from __future__ import annotations
-
 from functools import partial
 
 from fastapi import APIRouter, Response

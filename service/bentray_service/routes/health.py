@@ -1,7 +1,5 @@
 """/health: liveness and readiness of the service; /v1/cluster: health of the workers, lengths of queues."""
 
-from __future__ import annotations
-
 from fastapi import APIRouter, Request, Response
 from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 from pydantic import BaseModel, ConfigDict, Field

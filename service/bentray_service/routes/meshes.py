@@ -1,7 +1,5 @@
 """/v1/meshes: upload, list and delete triangle meshes; iso-surfaces of volumes."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Annotated, Any

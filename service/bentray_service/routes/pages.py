@@ -1,7 +1,5 @@
 """The web pages: viewer at /, documentation, REST reference at /docs, file formats at /docs/formats."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Rendered images with ETag and rate limit, until the client disconnects; views from query parameters."""
 
-from __future__ import annotations
-
 import asyncio
 import hashlib
 import inspect

@@ -1,7 +1,5 @@
 """/v1/projects: projects inside a tenant, and their members."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, TypeVar
 
 from fastapi import APIRouter, Body, Depends, Response, status

@@ -1,7 +1,5 @@
 """Conversion of database rows to records of the REST interface."""
 
-from __future__ import annotations
-
 import time
 from contextlib import suppress
 from typing import Any, TypeVar

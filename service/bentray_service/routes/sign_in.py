@@ -1,7 +1,5 @@
 """/sign-in and /sign-out: users of the page sign in at an OpenID provider."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable
 from html import escape

@@ -1,7 +1,5 @@
 """/v1/volumes: upload, list, show, analyse, summarise, download, render and delete volumes."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from functools import partial
 from typing import Annotated, Any, Literal, cast

@@ -1,7 +1,5 @@
 """Accounts: the only key of limits, each of which counts a tenant together with its projects."""
 
-from __future__ import annotations
-
 from typing import NewType
 
 from sqlalchemy import ColumnElement, SQLColumnExpression, func, select

@@ -1,7 +1,5 @@
 """Ages of items: the observed running time of services, and marks of items past their maximum age."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Collection
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """The table of batches: reconstructions of many scans that were started, are watched and cancelled as one."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """The table of checksums: size and SHA-256 of every stored file when it was written."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Collection
 from typing import NamedTuple

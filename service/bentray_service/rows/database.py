@@ -1,7 +1,5 @@
 """The database connection: opening, schema update, transactions, and how many threads may have one."""
 
-from __future__ import annotations
-
 import hashlib
 import itertools
 import json

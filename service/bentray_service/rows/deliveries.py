@@ -1,7 +1,5 @@
 """The table of messages to webhooks, and the secrets that sign them."""
 
-from __future__ import annotations
-
 import base64
 import json
 import secrets

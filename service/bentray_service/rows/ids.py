@@ -1,7 +1,5 @@
 """Ids of stored items and names of tenants: creation, and validation before either becomes part of a path."""
 
-from __future__ import annotations
-
 import re
 import secrets
 from typing import NewType

@@ -1,7 +1,5 @@
 """The job queue of all tenants, used by the job runner of the service."""
 
-from __future__ import annotations
-
 import secrets
 import time
 from collections import Counter

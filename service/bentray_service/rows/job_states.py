@@ -1,7 +1,5 @@
 """States of jobs: changes with their events, and the order in which accounts take turns."""
 
-from __future__ import annotations
-
 import math
 import time
 from functools import cache

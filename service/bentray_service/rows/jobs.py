@@ -1,7 +1,5 @@
 """The table of jobs for their tenants: submit, list, watch, cancel."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager

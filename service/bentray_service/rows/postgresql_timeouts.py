@@ -1,7 +1,5 @@
 """Connections to PostgreSQL with a time limit for each answer, also if the server hangs."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import psycopg

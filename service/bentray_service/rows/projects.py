@@ -4,8 +4,6 @@ The items of a project have the id of the project as tenant. So whatever separat
 rows, folders, lists, events, counts, pictures and downloads.
 """
 
-from __future__ import annotations
-
 import re
 import time
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Copies of all tables between databases, of one moment and of either kind."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The tables of the database, for SQLite and PostgreSQL: a class is a table, its instances are rows."""
 
-from __future__ import annotations
-
 from collections import Counter
 from typing import Annotated, Any, ClassVar, Literal, get_args
 

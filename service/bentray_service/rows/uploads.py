@@ -1,7 +1,5 @@
 """The table of resumable uploads; the offset of an upload is the size of its file."""
 
-from __future__ import annotations
-
 import time
 from typing import Any
 

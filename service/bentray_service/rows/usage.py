@@ -1,7 +1,5 @@
 """Storage accounting: bytes stored and reserved by each tenant; every function runs in a transaction."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass

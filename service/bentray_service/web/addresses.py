@@ -1,7 +1,5 @@
 """Loopback addresses and networks: of trusted proxies, and those that webhooks may reach."""
 
-from __future__ import annotations
-
 import ipaddress
 import socket
 from ipaddress import IPv4Network, IPv6Network

@@ -1,7 +1,5 @@
 """Examples of the OpenAPI description: each operation by curl, and the address of the service."""
 
-from __future__ import annotations
-
 import json
 import shlex
 from pathlib import PurePosixPath

@@ -1,7 +1,5 @@
 """HTML of pages that are generated as a whole, and the built documentation at /documentation."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cache
 from html import escape

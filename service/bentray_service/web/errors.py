@@ -1,7 +1,5 @@
 """Error responses as problem+json (RFC 9457), and exception handlers."""
 
-from __future__ import annotations
-
 import errno
 import json
 import logging

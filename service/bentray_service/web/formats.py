@@ -1,7 +1,5 @@
 """The page /docs/formats: what files the service reads, from the readers themselves."""
 
-from __future__ import annotations
-
 from html import escape
 
 from bentray_workers.files import mesh_formats, volume_formats

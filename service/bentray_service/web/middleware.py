@@ -1,7 +1,5 @@
 """Middleware of every response: request ids, security headers and headers of tus; the name of a route."""
 
-from __future__ import annotations
-
 import re
 import secrets
 from collections.abc import Mapping

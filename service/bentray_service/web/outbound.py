@@ -5,8 +5,6 @@ The client and the sign-in with OpenID Connect connect by ``Transport`` or ``Asy
 ``docs/reference/settings.md``.
 """
 
-from __future__ import annotations
-
 import ipaddress
 import os
 import re

@@ -1,7 +1,5 @@
 """The body of an error: problem+json of RFC 9457, with the field, the value found and the values accepted."""
 
-from __future__ import annotations
-
 from pydantic import BaseModel, ConfigDict, Field
 
 

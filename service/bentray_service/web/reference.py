@@ -1,7 +1,5 @@
 """The OpenAPI description, and the page /docs: a REST reference generated from it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from html import escape
 from typing import Any

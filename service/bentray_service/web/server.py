@@ -1,7 +1,5 @@
 """The options of Uvicorn; hostile connections are limited by the proxy in front (deploy/nginx.conf)."""
 
-from __future__ import annotations
-
 import errno
 import socket
 from typing import Any

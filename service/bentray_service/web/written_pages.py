@@ -1,7 +1,5 @@
 """The pages of the folder docs as HTML, with a search: the documentation where nobody has built it."""
 
-from __future__ import annotations
-
 import re
 from functools import cache
 from html import escape

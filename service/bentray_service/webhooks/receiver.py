@@ -5,8 +5,6 @@ resolved once, its addresses are checked, and the connection is made to the chec
 followed. Proxies of the environment are not used: a proxy resolves the name again, perhaps differently.
 """
 
-from __future__ import annotations
-
 import errno
 import ipaddress
 import logging

@@ -1,7 +1,5 @@
 """Sends the messages that are due, in threads of its own, until each is accepted or given up."""
 
-from __future__ import annotations
-
 import logging
 import random
 import threading

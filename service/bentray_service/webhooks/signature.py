@@ -1,7 +1,5 @@
 """Signatures of messages to webhooks by Standard Webhooks (standardwebhooks.com, version 1)."""
 
-from __future__ import annotations
-
 import hmac
 import json
 import time

@@ -1,7 +1,5 @@
 """Plans cover what was measured, are little above it but in kinds that are named, and are in the docs."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

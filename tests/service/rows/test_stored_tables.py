@@ -34,7 +34,7 @@ def test_meshes_are_kept_as_given_and_newest_first(database):
 
 @pytest.mark.parametrize(
     ("table", "name", "listed"),
-    [(Meshes, new_id("mesh"), "meshes"), (GeometryFields, field_of("a" * 64), "geometry-fields")],
+    [(Meshes, "mesh-" + "0" * 20, "meshes"), (GeometryFields, field_of("a" * 64), "geometry-fields")],
 )
 def test_missing_objects_are_not_found(database, table, name, listed):
     with pytest.raises(UnknownId, match=f"GET /v1/{listed}"):

@@ -4,8 +4,6 @@ For each kind of task the coefficients are those whose memory is at least each p
 the peaks by the least in relation to them: a linear programme with coefficients that are not negative.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Mapping, Sequence

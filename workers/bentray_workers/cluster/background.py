@@ -1,7 +1,5 @@
 """Background threads for tasks of long jobs: the system gives them what pictures and short jobs leave."""
 
-from __future__ import annotations
-
 import os
 import sys
 import threading

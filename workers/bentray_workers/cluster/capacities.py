@@ -1,7 +1,5 @@
 """Capacities of connected workers: memory and resources; embedded workers test OpenCL devices on demand."""
 
-from __future__ import annotations
-
 import asyncio
 import math
 from dataclasses import dataclass

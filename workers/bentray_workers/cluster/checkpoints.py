@@ -1,7 +1,5 @@
 """Checkpoints of one job: the states of its task graphs in files with check sums."""
 
-from __future__ import annotations
-
 import json
 import logging
 import time

@@ -1,7 +1,5 @@
 """The workers that are connected now."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

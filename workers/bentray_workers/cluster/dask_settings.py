@@ -1,7 +1,5 @@
 """Settings of Dask for all our schedulers, workers and clients."""
 
-from __future__ import annotations
-
 import copy
 
 import dask

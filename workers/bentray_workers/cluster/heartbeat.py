@@ -3,8 +3,6 @@
 A preload module of Dask; the health check must not load Dask, so it is imported in a worker only.
 """
 
-from __future__ import annotations
-
 import fcntl
 import os
 import re

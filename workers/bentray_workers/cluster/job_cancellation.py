@@ -1,7 +1,5 @@
 """Cancellation of tasks of a job: a task ends once the folder of its job is removed."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 

@@ -1,7 +1,5 @@
 """Progress of a job while its tasks run: kernels that its workers compile, and stages of a long task."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import replace

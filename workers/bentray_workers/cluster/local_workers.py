@@ -1,7 +1,5 @@
 """Workers of this machine for a scheduler elsewhere: they reconnect, and lost ones are replaced."""
 
-from __future__ import annotations
-
 import asyncio
 import logging
 import signal

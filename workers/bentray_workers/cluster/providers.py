@@ -1,7 +1,5 @@
 """Providers of clusters: this process, Slurm, or the Dask operator of Kubernetes."""
 
-from __future__ import annotations
-
 import importlib
 import os
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Log filter of workers: one line for rejected input and for a closed scheduler, which are no faults here."""
 
-from __future__ import annotations
-
 import logging
 
 from bentray_kernels.errors import InvalidInput

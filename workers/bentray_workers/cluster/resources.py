@@ -1,7 +1,5 @@
 """Dask resources of workers, the lanes of tasks: pictures and short jobs never queue behind long tasks."""
 
-from __future__ import annotations
-
 from types import MappingProxyType
 
 # Every worker has one of each, and a thread for each: a task begins beside those of the other lanes at once,

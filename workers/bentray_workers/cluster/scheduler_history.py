@@ -1,7 +1,5 @@
 """Scheduler preload: keep no history of finished tasks, which would grow without bound."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Iterable
 from typing import Any

@@ -1,7 +1,5 @@
 """Load of the scheduler: its tasks and its memory."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

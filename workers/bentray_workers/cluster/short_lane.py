@@ -1,7 +1,5 @@
 """The lane of short jobs: which jobs use it, and for how long."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

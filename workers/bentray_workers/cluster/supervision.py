@@ -1,7 +1,5 @@
 """Supervision of worker processes: lost ones are replaced until their number is restored."""
 
-from __future__ import annotations
-
 import asyncio
 import logging
 import os

@@ -1,7 +1,5 @@
 """Cancellation of the Dask task that runs in this thread, checked by long kernels."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from contextvars import ContextVar
 

@@ -4,8 +4,6 @@
 envelope of the peaks. The sizes that it is judged by are others, see ``bentray bench task_memory``.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Iterable, Mapping

@@ -1,7 +1,5 @@
 """The pool of a job: workers of a cluster that tasks run on, with retries, or threads of this process."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from queue import Empty, SimpleQueue

@@ -1,7 +1,5 @@
 """Retries of tasks of lost workers: submitted again when a worker dies, unless they kill their workers."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import count
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Descriptions of each kind of task for plans and errors."""
 
-from __future__ import annotations
-
 from types import MappingProxyType
 
 TASK_WORDS = MappingProxyType(

@@ -1,7 +1,5 @@
 """TLS between scheduler, workers and clients: certificates of a folder, or a new one in memory."""
 
-from __future__ import annotations
-
 import ssl
 from datetime import datetime
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Health of the connected workers: memory, threads, load and devices, without addresses or names of tasks."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Detection of kernels that numba compiles because they are not in its cache: log lines, and their names."""
 
-from __future__ import annotations
-
 import logging
 import time
 from collections.abc import Iterator

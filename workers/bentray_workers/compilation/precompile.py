@@ -5,8 +5,6 @@ kind of job runs once on the smallest scan that has all it needs. What is compil
 first called. A second run for the same sources ends at once.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 import sys

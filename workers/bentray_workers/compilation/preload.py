@@ -4,8 +4,6 @@ Kernels are compiled, or loaded from the cache, when a task first calls them. Wo
 compile the same kernel twice, see ``compile_events``.
 """
 
-from __future__ import annotations
-
 import os
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Bounded reading of foreign arrays: declared sizes are checked first, and no more is read."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """What readers refuse in files of any format: damaged data, as InvalidInput, and complex numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any

@@ -1,7 +1,5 @@
 """Atomic writing of HDF5 files, with an ordinary error on a full disk, on which HDF5 itself crashes."""
 
-from __future__ import annotations
-
 import io
 import os
 from collections.abc import Iterator, Mapping

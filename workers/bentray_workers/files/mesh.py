@@ -1,7 +1,5 @@
 """Mesh files: ``bentray-mesh`` in HDF5, and the summary of a mesh."""
 
-from __future__ import annotations
-
 import hashlib
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Checks of glTF, OBJ and OFF files for what trimesh reads without an error, but as another mesh."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

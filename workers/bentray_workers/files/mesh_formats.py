@@ -1,7 +1,5 @@
 """Import of untrusted meshes in all accepted formats, detected by content."""
 
-from __future__ import annotations
-
 import io
 import re
 import struct

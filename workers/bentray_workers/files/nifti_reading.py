@@ -1,7 +1,5 @@
 """Reading single-file NIfTI-1 and -2: the header by nibabel, the values here, within bounds."""
 
-from __future__ import annotations
-
 import logging
 from typing import Any
 

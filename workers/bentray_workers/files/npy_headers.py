@@ -1,7 +1,5 @@
 """Headers of NumPy's files, parsed by one thread at a time."""
 
-from __future__ import annotations
-
 import threading
 from typing import IO, Any
 

@@ -1,7 +1,5 @@
 """NumPy archives of plain arrays: a zip of .npy files; nothing is unpickled."""
 
-from __future__ import annotations
-
 import math
 import zipfile
 from collections.abc import Iterator

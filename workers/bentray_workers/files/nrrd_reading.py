@@ -1,7 +1,5 @@
 """Reading NRRD: the header by pynrrd, the values here, since pynrrd decompresses without bound."""
 
-from __future__ import annotations
-
 import gzip
 import math
 import re

@@ -1,7 +1,5 @@
 """Files of the picking in the folder of a job: the findings about the scan, and estimated water shots."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """The quantities of a reconstruction: unit, array in files, and words; a new one is added here first."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Literal, NamedTuple

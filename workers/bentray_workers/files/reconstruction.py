@@ -1,7 +1,5 @@
 """Reconstruction files (``reconstruction.h5``): written atomically, read exactly."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable

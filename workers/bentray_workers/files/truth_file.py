@@ -1,7 +1,5 @@
 """A truth to compare a result with, from a file: of a dataset, a result, or an array of speeds."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple

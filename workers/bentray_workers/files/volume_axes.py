@@ -5,8 +5,6 @@ as in NIfTI. Formats in LPS (left, posterior, superior: DICOM and MetaImage) hol
 order, with directions and origin in LPS.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field

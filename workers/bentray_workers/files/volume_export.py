@@ -1,7 +1,5 @@
 """Export of volumes to other file formats."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Import of untrusted volumes in all accepted formats, detected by content."""
 
-from __future__ import annotations
-
 import gzip
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

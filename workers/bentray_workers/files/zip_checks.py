@@ -1,7 +1,5 @@
 """Untrusted zips: checks of the directory, which ``zipfile`` compares members with; bounded members."""
 
-from __future__ import annotations
-
 import re
 import zipfile
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Arrays of foreign files by name: small ones read whole, large ones by rows."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field

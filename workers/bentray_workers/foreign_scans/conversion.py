@@ -1,7 +1,5 @@
 """Conversion of scans of all accepted formats to a canonical file, one emission at a time."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from pathlib import Path
 

@@ -5,8 +5,6 @@ Source:
     description of the data at the USCT data challenge of KIT.
 """
 
-from __future__ import annotations
-
 import math
 import re
 import zipfile

@@ -5,8 +5,6 @@ Source:
     scripts, github.com/KIT-3DUSCT.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -6,8 +6,6 @@ The zip holds ``geometry.npz``, with positions, emitters and receivers under the
 k-Wave records in the order of its grid; ``rx`` lists the element of each receiver.
 """
 
-from __future__ import annotations
-
 import io
 import re
 import zipfile

@@ -1,7 +1,5 @@
 """Layouts of plain arrays by name: from MATLAB, HDF5 or NumPy files to a dataset."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

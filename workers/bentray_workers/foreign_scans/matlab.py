@@ -3,8 +3,6 @@
 Cells, structures, objects, functions and opaque data of version 5 are named but never read.
 """
 
-from __future__ import annotations
-
 import struct
 import warnings
 import zlib

@@ -1,7 +1,5 @@
 """Opening a foreign scan by its content: MATLAB 5, HDF5, a zip, or a folder; and the record of a reader."""
 
-from __future__ import annotations
-
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager

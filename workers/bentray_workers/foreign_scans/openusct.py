@@ -4,8 +4,6 @@ Source:
     ``software/schema/README.md`` of github.com/Jerome-Graves/openUSCT, format version 1.0.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Properties of a scan that its user states: own names of variables, units, water and frequency."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field

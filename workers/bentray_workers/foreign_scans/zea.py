@@ -5,8 +5,6 @@ Source:
     for the group ``probe``.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import Any

@@ -1,7 +1,5 @@
 """Test card for the backdrop of refractive rendering: lines, circles, colours and text."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Figures of Matplotlib: style, layout and PNG; one picture at a time."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Captions: quantities, slice, and method of a reconstruction."""
 
-from __future__ import annotations
-
 import math
 
 from bentray_kernels.tomography import Reconstruction, Settings

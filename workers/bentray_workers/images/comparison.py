@@ -1,7 +1,5 @@
 """Comparison of several reconstructions with one truth: images, differences, convergence."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Curves: residual by iteration, speeds along a line."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from itertools import cycle
 

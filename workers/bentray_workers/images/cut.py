@@ -1,7 +1,5 @@
 """Slices of a volume: index, image, and whether to show a vertical section."""
 
-from __future__ import annotations
-
 import math
 from typing import TypeVar
 

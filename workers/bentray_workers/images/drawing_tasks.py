@@ -1,7 +1,5 @@
 """Drawing tasks; they load Matplotlib, which takes 30 MB, only where they run."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A procedural panorama: sky, sun, hills and striped fields."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

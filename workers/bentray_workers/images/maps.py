@@ -1,7 +1,5 @@
 """Maps: images in mm with the outline of a region, colour limits and colour bars."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from typing import Any

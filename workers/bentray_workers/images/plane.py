@@ -1,7 +1,5 @@
 """A slice of a volume across any axis, with its position."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

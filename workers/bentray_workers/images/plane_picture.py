@@ -1,7 +1,5 @@
 """Picture of a slice: with frame and colour bar, or the image alone, of any size."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """RGB arrays as PNG, and pictures as RGB arrays."""
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Quality page of a scan: gathers with picks, matrix of times, excluded pairs with reasons, findings."""
 
-from __future__ import annotations
-
 import textwrap
 from itertools import cycle
 from typing import Any

@@ -1,7 +1,5 @@
 """Report of one reconstruction: images, convergence, residuals and, with a truth, errors."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Iterator
 

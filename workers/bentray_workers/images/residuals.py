@@ -1,7 +1,5 @@
 """Histogram panel of the residuals of the last iteration."""
 
-from __future__ import annotations
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator

@@ -1,7 +1,5 @@
 """Summary of a reconstruction: its quantities, the choice of the model, and the errors against the truth."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import asdict
 from pathlib import Path

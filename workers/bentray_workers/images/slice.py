@@ -1,7 +1,5 @@
 """The picture of one slice of a reconstruction or volume file."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Style of the picture of a slice: size, colours, bars and frame."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from bentray_kernels.errors import InvalidInput

@@ -1,7 +1,5 @@
 """Export of the truth of a scan at the nodes of its reconstruction."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from bentray_kernels.errors import InvalidInput

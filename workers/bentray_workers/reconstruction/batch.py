@@ -1,7 +1,5 @@
 """Batch processing: many datasets on one cluster, a bounded number at a time, with separate failures."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections import deque

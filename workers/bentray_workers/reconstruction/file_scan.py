@@ -1,7 +1,5 @@
 """A scan in a file, for tasks: every process reads it once."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache, partial

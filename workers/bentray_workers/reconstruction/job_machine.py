@@ -1,7 +1,5 @@
 """The workers of a job: their device and its blocks, decided at its start and kept when it is resumed."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Plan of a reconstruction: tasks and memory, computed before it starts and checked against the workers."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

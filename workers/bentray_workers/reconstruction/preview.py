@@ -1,7 +1,5 @@
 """The image of an unfinished reconstruction, from its newest checkpoint."""
 
-from __future__ import annotations
-
 import base64
 import json
 import math

@@ -1,7 +1,5 @@
 """Quality report of a dataset file: findings and a page; traces are read one emission at a time."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """What determines the memory of the tasks that trace rays or use them, and of SART in blocks."""
 
-from __future__ import annotations
-
 import math
 
 from bentray_kernels.rays.block_tracing import ABOVE, BELOW, GUARD

@@ -4,8 +4,6 @@ The count is exact enough to compare jobs of one class with each other; the spee
 The service multiplies the estimate by the measured time of earlier jobs of the same class.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

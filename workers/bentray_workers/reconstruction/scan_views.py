@@ -1,7 +1,5 @@
 """Views of a stored scan for a person: its geometry, and the traces of one emission with their picks."""
 
-from __future__ import annotations
-
 import base64
 import math
 from dataclasses import asdict, replace

@@ -3,8 +3,6 @@
 None grows with the number of emissions times samples: a task reads one emission after the other.
 """
 
-from __future__ import annotations
-
 import math
 
 from bentray_kernels.acquisition.picking.pickers import PICKERS

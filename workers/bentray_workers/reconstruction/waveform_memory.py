@@ -6,8 +6,6 @@ that a fit to them says nothing of the fields (it gave them no bytes). ``bentray
 them.
 """
 
-from __future__ import annotations
-
 from bentray_kernels.tomography.settings import Settings
 from bentray_kernels.tomography.solver_choice import wave_engine
 from bentray_kernels.tomography.waveform.automatic_settings import WaveScale

@@ -1,7 +1,5 @@
 """Coefficients of a filtered volume, for programs that cast rays through it themselves."""
 
-from __future__ import annotations
-
 import io
 import math
 from collections.abc import Sequence

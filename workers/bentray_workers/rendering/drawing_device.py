@@ -1,7 +1,5 @@
 """The device that draws a picture: scenes kept in its memory, and its name for the result."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 

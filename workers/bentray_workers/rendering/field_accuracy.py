@@ -1,7 +1,5 @@
 """Accuracy of lookups in a geometry field against exact intersection, for random rays."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bentray_kernels.geometry_field.tables.accurate_lookup import STEPS, find

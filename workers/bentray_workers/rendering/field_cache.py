@@ -1,7 +1,5 @@
 """Cache of geometry fields: surfaces and scenes made once per process, memory-mapped tables."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path

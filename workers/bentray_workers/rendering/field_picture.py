@@ -1,7 +1,5 @@
 """Pictures of geometry fields: ray-traced scenes, whole or in tiles, geometry images and normal maps."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from bentray_kernels.geometry_field.tracing.ray_tracer import TraceSettings, trace

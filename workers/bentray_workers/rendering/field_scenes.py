@@ -1,7 +1,5 @@
 """Scenes of a mesh and its geometry field, and their cameras."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from functools import cache

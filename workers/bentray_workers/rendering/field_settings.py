@@ -1,7 +1,5 @@
 """Settings of a geometry field: samples and geometry image."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from dataclasses import asdict, dataclass

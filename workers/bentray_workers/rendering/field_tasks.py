@@ -1,7 +1,5 @@
 """Tasks of the computation of a geometry field in a folder: layout, table rows, borders and accuracy."""
 
-from __future__ import annotations
-
 import time
 from functools import partial
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Settings of a picture of a geometry field, with their checks."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 

@@ -1,7 +1,5 @@
 """Computation of a geometry field: layout, table rows in batches, accuracy, kept as a folder of files."""
 
-from __future__ import annotations
-
 import errno
 from collections.abc import Callable
 from contextlib import suppress

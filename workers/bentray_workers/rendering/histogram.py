@@ -1,7 +1,5 @@
 """Histogram of a quantity of a volume, and the surface that a picture shows by default."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from pathlib import Path
 from typing import Any

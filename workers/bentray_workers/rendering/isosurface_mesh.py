@@ -1,7 +1,5 @@
 """The largest connected piece of an iso-surface of a volume, as a mesh."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Refractive rendering of volumes: whole pictures, or tiles of rows."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path

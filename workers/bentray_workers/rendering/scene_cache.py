@@ -1,7 +1,5 @@
 """Cache of scenes: made once per process for each file and filter, within the memory."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Pictures as rendering tasks: whole, or in tiles of rows that are stacked."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Turntables: refractive renderings of a volume from all sides, in one file."""
 
-from __future__ import annotations
-
 import zipfile
 from collections import defaultdict
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """Plan of a turntable: tasks, memory and counted work of its frames, checked against the workers."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

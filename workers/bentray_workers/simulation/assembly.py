@@ -1,7 +1,5 @@
 """The last task of a simulated scan: the dataset file of all parts."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterator
 from pathlib import Path

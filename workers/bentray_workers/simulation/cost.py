@@ -1,7 +1,5 @@
 """Cost of a simulated scan: memory of its tasks, CPU time, size of its file."""
 
-from __future__ import annotations
-
 from bentray_kernels.acquisition.simulation.volume_scan import AXIAL_MARGIN_NODES
 from bentray_kernels.wave.memory import padded_nodes
 from bentray_kernels.wave.points import REACH

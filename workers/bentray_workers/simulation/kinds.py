@@ -1,7 +1,5 @@
 """The kinds of simulated scans: travel times or waves, in a plane or in 3-D."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from types import MappingProxyType
 

@@ -1,7 +1,5 @@
 """Parts of a simulated scan, one task each: emitters computed into a file, and read back."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial

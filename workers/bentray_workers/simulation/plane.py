@@ -1,7 +1,5 @@
 """A travel-time scan of a 2-D breast phantom: settings and dataset."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial

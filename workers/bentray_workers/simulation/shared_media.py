@@ -1,7 +1,5 @@
 """Media of simulations, which the threads of a process share: each is made once, and delays no other."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Hashable
 from functools import lru_cache, wraps
 from threading import Lock

@@ -1,7 +1,5 @@
 """Task graph of a simulated scan: its parts into files, then the dataset of all parts."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

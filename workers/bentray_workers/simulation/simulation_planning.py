@@ -1,7 +1,5 @@
 """Plan of a simulated scan: tasks, memory, CPU time and file size, checked against the workers."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

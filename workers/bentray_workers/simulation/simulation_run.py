@@ -1,7 +1,5 @@
 """Simulation of a scan: on a cluster or in this process, by the same task graph and to the same bits."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Callable
 from contextlib import nullcontext

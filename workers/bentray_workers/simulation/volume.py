@@ -1,7 +1,5 @@
 """A travel-time scan of the 3-D breast phantom (Li 2008, Table 7): settings and dataset."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

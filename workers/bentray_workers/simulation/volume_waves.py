@@ -1,7 +1,5 @@
 """A 3-D wave simulation of a ring scan of the 3-D breast phantom (Li 2008, Table 7)."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import ClassVar

@@ -1,7 +1,5 @@
 """A 2-D wave simulation of a ring scan: settings, one emission, and the dataset."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import ClassVar

@@ -1,7 +1,5 @@
 """Result of a calibration, each value with its standard deviation."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

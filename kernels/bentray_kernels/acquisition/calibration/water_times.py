@@ -1,7 +1,5 @@
 """Arrival times of the water pulses to a fraction of a sample, by correlation with the common pulse."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

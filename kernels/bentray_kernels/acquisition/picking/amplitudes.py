@@ -1,7 +1,5 @@
 """Amplitude picking: log ratios of the pulses in water and object, by energy or by the spectral ratio."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple

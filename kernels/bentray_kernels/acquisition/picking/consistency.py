@@ -1,7 +1,5 @@
 """Consistency of picks with their distance, neighbours and reciprocal pair; inconsistent ones are removed."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

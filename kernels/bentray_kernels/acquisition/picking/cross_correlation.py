@@ -1,7 +1,5 @@
 """Delay between the pulses of two traces by cross-correlation, to a fraction of a sample."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

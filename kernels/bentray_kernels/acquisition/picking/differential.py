@@ -1,7 +1,5 @@
 """Differential picking of one emission: arrival in the object minus arrival in water at every receiver."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

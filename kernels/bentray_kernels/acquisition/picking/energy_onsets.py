@@ -1,7 +1,5 @@
 """Energy-based onset pickers: Coppens' energy ratio, and short-term over long-term average (STA/LTA)."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """First-arrival picking of a whole scan: travel time object minus water from its traces."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace

@@ -4,8 +4,6 @@ Traces are (nt,) in any unit; positions and lengths are in samples and may be fr
 depend on the unit of a trace, so per-trace scales are not needed.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Onset pickers by name, and their common interface for compiled code."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Shape of the array: its angular coverage, and the checks that it excludes."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator
 

@@ -1,7 +1,5 @@
 """Unusable single traces: not finite, constant, clipped."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

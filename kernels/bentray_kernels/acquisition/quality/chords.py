@@ -1,7 +1,5 @@
 """Checks of a scan without a water shot, by the chords that miss the object."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...arrays import Flags, Floats

@@ -1,7 +1,5 @@
 """Inconsistent travel times: apparent speeds, cycle jumps and outliers, and violations of reciprocity."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """Application of findings to a dataset: corrections, and masks of pairs left out."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 

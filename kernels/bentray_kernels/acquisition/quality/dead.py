@@ -1,7 +1,5 @@
 """Dead elements: hardly any of their pairs has a pulse or a travel time."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

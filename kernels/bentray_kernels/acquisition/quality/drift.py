@@ -1,7 +1,5 @@
 """Water that warms or cools during a scan: the slope of times over distance changes with the emission."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

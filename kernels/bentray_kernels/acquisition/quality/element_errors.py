@@ -1,7 +1,5 @@
 """Delays and displacements of single elements, fitted to residuals of travel times in water."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

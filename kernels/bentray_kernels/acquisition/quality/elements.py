@@ -1,7 +1,5 @@
 """Elements with a clock offset, and displaced elements, by the times of chords through water."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The finding that a scan has no water shot, and what was estimated in its place."""
 
-from __future__ import annotations
-
 from ..dataset import Dataset
 from ..reference.chord_pulses import ChordPulses, read_pulses
 from ..reference.reference_shot import ReferenceShot, chord_signs, estimate_reference

@@ -1,7 +1,5 @@
 """Examination of a scan: checks of traces, channels and picked times, in this order."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from itertools import count

@@ -1,7 +1,5 @@
 """Findings of the checks of a scan, and the report of all of them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Impossible times of a scan, and the share of its pairs that is left out: too many make it unusable."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 

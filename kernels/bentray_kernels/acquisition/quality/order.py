@@ -1,7 +1,5 @@
 """Times that belong to other elements than the scan says: the scan is refused, another order proposed."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from ...arrays import Floats

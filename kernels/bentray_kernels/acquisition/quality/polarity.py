@@ -1,7 +1,5 @@
 """Inverted polarity: elements whose water pulses have the opposite sign."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """Wrong element positions: water times that deviate equally in both directions."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """Checks of the sampling rate against the water speed, and of the centre frequency against the spectrum."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

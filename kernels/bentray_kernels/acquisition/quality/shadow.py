@@ -1,7 +1,5 @@
 """A strong scatterer, such as a bubble: chords through one small place have lost much amplitude."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

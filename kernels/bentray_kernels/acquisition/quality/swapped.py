@@ -1,7 +1,5 @@
 """Swapped channels: two elements whose water times fit each other's positions."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import combinations
 

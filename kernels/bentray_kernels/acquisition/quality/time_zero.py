@@ -1,7 +1,5 @@
 """Time zero of the recording, from the water line, and of the object scan, from unobstructed pairs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Water speed fitted to arrival times over distance, compared with the stated one."""
 
-from __future__ import annotations
-
 from ...errors import InvalidInput
 from ..dataset import Dataset
 from ..reference.water_chords import FASTEST_MPS, SLOWEST_MPS

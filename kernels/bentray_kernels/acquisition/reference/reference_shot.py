@@ -1,7 +1,5 @@
 """The water shot that a scan lacks, estimated from the chords of the object scan that miss the object."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from functools import partial

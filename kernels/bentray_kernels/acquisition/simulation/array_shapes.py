@@ -1,7 +1,5 @@
 """Shapes of simulated arrays other than whole rings: arcs, facing lines and bowls, with directions."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Medium of a simulated scan: speed and attenuation on a fine grid, and the arrivals through them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import product
 

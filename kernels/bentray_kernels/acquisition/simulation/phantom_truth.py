@@ -1,7 +1,5 @@
 """True values of a phantom, for comparison with its image."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Simulated ring scans of a phantom, on a finer grid and with another scheme than the inversions."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

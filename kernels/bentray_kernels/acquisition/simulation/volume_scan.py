@@ -1,7 +1,5 @@
 """Simulated scans of a volume by a ring at several heights: 2-D wave fronts in each plane, or 3-D."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Geometry images: a surface as a square image of positions, with normals and colours."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """Rasterisation of a chart: the surface point of each pixel."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Stitching of a geometry image into a mesh: pixels to the seam, and both sides of the seam."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Subsampling of geometry images: the resolution is halved until the geometric error is too large."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ...errors import InvalidInput

@@ -1,7 +1,5 @@
 """Short cuts between boundaries, after which a surface without handles is a disk."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree

@@ -1,7 +1,5 @@
 """Cuts of a surface: through its handles, and to the points of strongest shrinkage in the flat layout."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

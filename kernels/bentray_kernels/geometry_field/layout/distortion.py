@@ -1,7 +1,5 @@
 """Distortion of flat layouts: area, shape, flipped triangles, overlap."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Tutte embedding: fold-free flat layouts for meshes whose conformal layout folds."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.sparse import csc_array
 

@@ -1,7 +1,5 @@
 """Rotation and scaling of a flat layout to fill the unit square."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial import ConvexHull
 

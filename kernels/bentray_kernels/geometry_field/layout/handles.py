@@ -1,7 +1,5 @@
 """Handle cutting: short loops through all handles of a surface."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array

@@ -1,7 +1,5 @@
 """Conformal parameterisation: a surface is cut to a disk and flattened onto the unit square."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass

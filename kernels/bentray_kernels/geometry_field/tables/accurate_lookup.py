@@ -5,8 +5,6 @@ face and, if the point lies outside the face, with the planes of its neighbours:
 face that the ray really hits, and the result is exact. A completed walk never reports a false hit.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...arrays import Float32s, Int32s

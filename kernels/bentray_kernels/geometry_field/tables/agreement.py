@@ -3,8 +3,6 @@
 Entries agree when all of them meet the mesh, and at about the same distance.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

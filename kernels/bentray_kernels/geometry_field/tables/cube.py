@@ -5,8 +5,6 @@ Each face has n² samples at the middles of its squares. A sample (x, y) of face
 6n × n at x₀ = x + kn, x₁ = y, and has the number 6n·x₁ + x₀ (dissertation, section 5.3.3, figure 24).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...arrays import Floats

@@ -8,8 +8,6 @@ field. To hold t rather than the direction lets far hits stay put when s moves t
 alone is kept: from there the ray itself walks, since where it starts on the surface no error is small.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

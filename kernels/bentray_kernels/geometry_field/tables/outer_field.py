@@ -4,8 +4,6 @@ Dissertation, sections 5.2.2 and 5.3.3. The table contains a face and a position
 which follow from the face: so values of different faces are never averaged.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

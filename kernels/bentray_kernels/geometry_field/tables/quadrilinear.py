@@ -4,8 +4,6 @@ Dissertation, section 5.3.4. Its weights are ⌈x⌉ − x and x − ⌊x⌋, wh
 so the first of them is 1 − (x − ⌊x⌋) here.
 """
 
-from __future__ import annotations
-
 from ...arrays import Float32s
 from ...compilation.compiled import kernel
 from ...compilation.float32 import higher, lower, real, whole

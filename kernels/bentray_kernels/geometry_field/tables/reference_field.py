@@ -5,8 +5,6 @@ normal are read from the geometry image there. Averaged (u, v) are meaningless w
 lie on both sides of a seam or silhouette, so the lookups of ``OuterField`` are more accurate.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

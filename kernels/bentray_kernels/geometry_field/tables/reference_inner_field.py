@@ -6,8 +6,6 @@ the ray's line leaves it, as in ``InnerField``. It holds the (u, v) of t and not
 so the ray ends where the one from the point closest to s ends.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...arrays import Float32s, Floats, Int32s

@@ -1,7 +1,5 @@
 """Shading: normals, light and texture of surfaces, ground and environment."""
 
-from __future__ import annotations
-
 import math
 
 from ...arrays import Floats, Vector

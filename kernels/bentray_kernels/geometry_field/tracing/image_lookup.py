@@ -4,8 +4,6 @@ Section 5.3.2: the (u, v) of the entries is looked up in the geometry image, whi
 of the hit. The next ray starts at that position, which is not exactly on the ray.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...arrays import Vector

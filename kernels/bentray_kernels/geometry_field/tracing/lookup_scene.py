@@ -1,7 +1,5 @@
 """The first hit of a ray on one shape, from its fields or by exact intersection."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...arrays import Int32s, Vector

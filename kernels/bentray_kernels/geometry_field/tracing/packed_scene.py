@@ -1,7 +1,5 @@
 """A scene for compiled functions: the concatenated arrays of all shapes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

@@ -5,8 +5,6 @@ colour is weighted by the shares along the path, so that the weights of a pixel'
 last depth the rest of the weight gets the environment.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass

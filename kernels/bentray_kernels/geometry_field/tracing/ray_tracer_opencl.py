@@ -1,7 +1,5 @@
 """The ray tracer on an OpenCL device: the images of ``ray_tracer.trace``, one work-item per pixel."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...arrays import Flags

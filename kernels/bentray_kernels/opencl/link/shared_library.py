@@ -7,8 +7,6 @@ object may hold (thread-local data, absolute 32-bit addresses) ends with an erro
 standard library, since it starts once a kernel. Formats: System V ABI, AMD64 supplement, chapters 4 and 5.
 """
 
-from __future__ import annotations
-
 import struct
 import sys
 from dataclasses import dataclass, field

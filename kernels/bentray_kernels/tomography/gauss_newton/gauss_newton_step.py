@@ -4,8 +4,6 @@ Unlike in SART, where each emitter needs the image of the previous one, the emit
 independent: a slice can use as many workers as it has emitters.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Huber loss: linear instead of quadratic beyond a limit, so that outliers have less weight."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

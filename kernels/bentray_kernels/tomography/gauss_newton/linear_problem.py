@@ -1,7 +1,5 @@
 """The linear problem of a Gauss–Newton step: least squares with Huber loss and a penalty."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Differential operators of the penalties of an image, and their adjoints."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np

@@ -3,8 +3,6 @@
 Indices are unsigned: for signed ones numba tests whether they count from the end, which takes a third longer.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

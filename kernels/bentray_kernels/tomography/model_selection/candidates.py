@@ -1,7 +1,5 @@
 """Task graph of a candidate model: a reconstruction from the training pairs, and its held-out misfit."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

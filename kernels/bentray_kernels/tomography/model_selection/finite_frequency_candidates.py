@@ -1,7 +1,5 @@
 """Candidates with finite-frequency (fat) rays for scans of known frequency, and the choice among them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

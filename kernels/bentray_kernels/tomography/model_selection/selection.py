@@ -1,7 +1,5 @@
 """Choice of rays and method by held-out validation: candidates must predict pairs they were not fitted to."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from typing import Any

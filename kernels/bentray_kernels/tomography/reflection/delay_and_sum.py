@@ -1,7 +1,5 @@
 """Delay and sum of analytic signals over emitters and receivers, with an aperture of opening angles."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Delay and sum on an OpenCL device: the sums of ``delay_and_sum``, pixel by pixel."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

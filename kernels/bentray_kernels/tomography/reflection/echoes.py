@@ -1,7 +1,5 @@
 """Analytic signals of the echoes of an emission, without transmitted waves; delay and length of the pulse."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Travel times from elements to every pixel: factored Eikonal solutions, read by cubic splines."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

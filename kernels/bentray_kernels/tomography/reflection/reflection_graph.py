@@ -1,7 +1,5 @@
 """Task graph of the reflection image of one slice: travel times, the pulse, then sums over emissions."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 from typing import Any

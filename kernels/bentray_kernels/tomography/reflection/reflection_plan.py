@@ -1,7 +1,5 @@
 """Plan of a reflection image, shared by its tasks: medium, elements, used pairs and pixels."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """A reconstruction with its reflection image: plans of the slices, their task graphs, coherence, decibels."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """SART of many slices on an OpenCL device: wave fronts, rays, back-projection and updates stay there."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Eikonal-SART of several slices in one call: together on an OpenCL device, or one after the other."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

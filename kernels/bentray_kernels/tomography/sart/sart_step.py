@@ -1,7 +1,5 @@
 """Eikonal-SART, one emitter at a time, as a pure step from state to state (chapter 6, equations 1 to 6)."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field, replace
 from typing import Any

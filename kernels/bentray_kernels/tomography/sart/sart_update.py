@@ -1,7 +1,5 @@
 """One SART update of an image from some emitters: one compiled pass for slices, single rays otherwise."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 

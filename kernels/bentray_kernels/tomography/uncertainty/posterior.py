@@ -8,8 +8,6 @@ are B·w + white noise. The solution of (1 + Bᵀ·B)·w = Bᵀ·ε + ξ for whi
 Bardsley et al. 2014); ξ = 0 and the residuals in place of ε give its mean.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial

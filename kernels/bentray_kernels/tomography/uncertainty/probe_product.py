@@ -1,7 +1,5 @@
 """Product of the normal matrix of rays with several probes at once: each row of the matrix is read once."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...arrays import Floats

@@ -1,7 +1,5 @@
 """Standard deviation of each node and resolution width of an image made from travel times."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

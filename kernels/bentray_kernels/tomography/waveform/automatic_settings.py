@@ -1,7 +1,5 @@
 """Automatic settings of a full-waveform refinement: bands, window and bounds from the scan."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import NamedTuple
 

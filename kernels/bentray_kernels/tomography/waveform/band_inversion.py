@@ -1,7 +1,5 @@
 """Waveform refinement of an image in one band: misfits of single emitters, then one step from all of them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Image and curvature of one frequency band on the grid of the next."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.ndimage import map_coordinates
 

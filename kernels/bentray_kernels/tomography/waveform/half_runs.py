@@ -1,7 +1,5 @@
 """Standard deviation of a full-waveform image: its last bands again, with each half of the emitters."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """State of a refinement: the active band and the results of finished bands."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Records of a reconstruction's history for the images of a band."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

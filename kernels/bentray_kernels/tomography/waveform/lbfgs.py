@@ -1,7 +1,5 @@
 """Search direction of limited-memory BFGS."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

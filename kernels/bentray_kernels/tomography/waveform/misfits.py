@@ -1,7 +1,5 @@
 """Misfits of simulated and recorded traces, and their derivatives by every simulated sample."""
 
-from __future__ import annotations
-
 from typing import Protocol
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The inverse problem of a band from a dataset: grid, time steps, pairs and drawn emitters."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Full-waveform refinement of a ray-based reconstruction: its task graphs, and the assembled result."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Task graph of a full-waveform refinement of one slice through all its bands."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

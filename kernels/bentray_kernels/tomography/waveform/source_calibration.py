@@ -1,7 +1,5 @@
 """Calibration of the wavelet and of the phase speed of the water from water shots."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Source wavelet of a band, estimated anew from the traces of the object with the image reached so far."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...arrays import Floats

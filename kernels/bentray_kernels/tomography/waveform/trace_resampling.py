@@ -1,7 +1,5 @@
 """Resampling of recorded traces to the simulator: band-pass filter, time steps, numerical dispersion."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Held-out validation of an image by simulated and recorded traces of emitters that are not used for it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 from ...task_graph import Task

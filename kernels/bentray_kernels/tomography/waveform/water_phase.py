@@ -1,7 +1,5 @@
 """Fit of the phase speed of the water to water shots."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...arrays import Floats

@@ -1,7 +1,5 @@
 """A slice of a scan as the tasks of a waveform refinement see it."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from ..scan import Source

@@ -1,7 +1,5 @@
 """Records in checkpoints of a full-waveform refinement, beside those of the reconstruction by rays."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from types import MappingProxyType
 

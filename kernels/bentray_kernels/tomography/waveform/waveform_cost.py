@@ -1,7 +1,5 @@
 """Estimated CPU time of a refinement, and advice whether to refine."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from ..result import EXCESS, Candidate

@@ -1,7 +1,5 @@
 """The inverse problem of a scan in one band: elements on a grid, resampled traces, wavelet."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any

@@ -1,7 +1,5 @@
 """Settings of a full-waveform refinement: frequency bands from low to high, and the settings of all bands."""
 
-from __future__ import annotations
-
 from dataclasses import MISSING, dataclass
 from typing import Literal, NamedTuple
 

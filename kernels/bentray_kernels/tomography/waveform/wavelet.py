@@ -1,7 +1,5 @@
 """Estimation of the source wavelet from water shots."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...arrays import Floats

@@ -1,7 +1,5 @@
 """Options of a command in place of one parameter, generated from tables or from the fields of requests."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import Field, dataclass, fields

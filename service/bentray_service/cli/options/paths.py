@@ -1,7 +1,5 @@
 """Validation of input and output paths before the work starts."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryFile

@@ -1,7 +1,5 @@
 """The options of views: of a volume, and of a geometry field with its settings; repeated ones."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any

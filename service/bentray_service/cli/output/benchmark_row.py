@@ -1,7 +1,5 @@
 """One row of a benchmark: measured value, goal, baselines of an image error, and whether the goal is met."""
 
-from __future__ import annotations
-
 import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Groups of commands, and exit codes: 0 success, 1 failure, 2 invalid input, 3 doubtful, 130 after Ctrl-C."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Metrics of a reconstruction, for `reconstruction.json` and the summary table."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import asdict
 from typing import Any

@@ -1,7 +1,5 @@
 """Terminal output: results on stdout, progress and messages on stderr."""
 
-from __future__ import annotations
-
 import json
 import math
 import sys

@@ -1,7 +1,5 @@
 """Models of batches of reconstructions."""
 
-from __future__ import annotations
-
 from datetime import datetime
 from typing import Annotated, Any, ClassVar
 

@@ -1,7 +1,5 @@
 """Models of datasets, jobs and volumes."""
 
-from __future__ import annotations
-
 from datetime import datetime
 from typing import Annotated, Any, ClassVar, Literal
 

@@ -1,7 +1,5 @@
 """Changes of names, notes and other statements of the user, and corrections of scans."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field

@@ -1,7 +1,5 @@
 """Models of projects and their members."""
 
-from __future__ import annotations
-
 from datetime import datetime
 from typing import Annotated, ClassVar, Literal
 

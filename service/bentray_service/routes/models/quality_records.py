@@ -1,7 +1,5 @@
 """Models of the quality report of a scan."""
 
-from __future__ import annotations
-
 from typing import ClassVar, Literal
 
 from pydantic import BaseModel, Field

@@ -1,7 +1,5 @@
 """Models of the summary of a reconstruction."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from pydantic import BaseModel, Field

@@ -1,7 +1,5 @@
 """Models of meshes and geometry fields."""
 
-from __future__ import annotations
-
 from datetime import datetime
 from typing import Any, ClassVar
 

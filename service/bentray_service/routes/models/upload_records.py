@@ -1,7 +1,5 @@
 """Models of resumable uploads."""
 
-from __future__ import annotations
-
 from datetime import datetime
 from typing import Annotated, Literal
 

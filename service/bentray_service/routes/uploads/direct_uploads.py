@@ -1,7 +1,5 @@
 """/v1/direct-uploads: files that clients send straight to the bucket, by presigned addresses."""
 
-from __future__ import annotations
-
 import base64
 from typing import Annotated
 

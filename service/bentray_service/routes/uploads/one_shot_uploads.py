@@ -1,7 +1,5 @@
 """One-shot uploads: receive the body, ingest it in a separate process, and insert its row."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Callable, Mapping
 from functools import partial

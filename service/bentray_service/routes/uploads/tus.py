@@ -4,8 +4,6 @@ A complete upload is ingested in the background. Its state changes from ``receiv
 ``done`` with the id of the result, or to ``refused`` with the problem.
 """
 
-from __future__ import annotations
-
 import shutil
 from datetime import UTC, datetime
 from email.utils import format_datetime

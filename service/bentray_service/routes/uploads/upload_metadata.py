@@ -1,7 +1,5 @@
 """Metadata of an upload: from query parameters, the name of the file, or the metadata header of tus."""
 
-from __future__ import annotations
-
 import base64
 import re
 from collections.abc import Callable, Sequence

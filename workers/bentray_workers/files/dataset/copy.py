@@ -1,7 +1,5 @@
 """Copying a dataset file to canonical form, or corrected, with traces in pieces: they may be too large."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping

@@ -1,7 +1,5 @@
 """Reading a dataset file in the upload format; errors name the field, its value and accepted values."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable

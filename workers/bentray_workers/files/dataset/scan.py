@@ -1,7 +1,5 @@
 """Reading a scan: without its traces, its counts for plans, and its traces one emission at a time."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress

@@ -1,7 +1,5 @@
 """Corrections that the numbers of a scan suggest: units of times and lengths, frequency, order."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Atomic writing of a dataset file; the same dataset gives the same bytes."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable, Iterable

@@ -1,7 +1,5 @@
 """The content of an exported file, images on one grid; and what several writers share."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module

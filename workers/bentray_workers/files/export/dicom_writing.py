@@ -1,7 +1,5 @@
 """Writing volumes as DICOM Parametric Maps, one frame for each slice and quantity."""
 
-from __future__ import annotations
-
 import hashlib
 import math
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """MATLAB files (.mat, version 5) of named arrays."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

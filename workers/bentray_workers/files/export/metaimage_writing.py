@@ -1,7 +1,5 @@
 """Writing volumes as MetaImage files (.mha): a text header, then the values; positions in mm, LPS."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

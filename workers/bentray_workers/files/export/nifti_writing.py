@@ -1,7 +1,5 @@
 """Writing volumes as NIfTI files: lengths in mm, positions in RAS."""
 
-from __future__ import annotations
-
 import gzip
 from pathlib import Path
 

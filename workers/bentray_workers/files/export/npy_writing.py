@@ -1,7 +1,5 @@
 """Writing the values of volumes as NumPy arrays."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Writing volumes as NRRD files: lengths in mm, positions in RAS."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

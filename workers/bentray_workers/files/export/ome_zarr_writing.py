@@ -1,7 +1,5 @@
 """Writing volumes as OME-Zarr 0.5, in a folder or a zip; one channel for each quantity."""
 
-from __future__ import annotations
-
 import shutil
 import zipfile
 from pathlib import Path

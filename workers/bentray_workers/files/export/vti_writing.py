@@ -1,7 +1,5 @@
 """Writing volumes as VTK ImageData (.vti) for ParaView: XML with all images as appended raw data."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Iterable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Whether a volume is reconstructed in blocks, and in how many: the fewest whose tasks fit a worker."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """Arrays of a volume in blocks of planes of x: one file for each block, in the folder of the job."""
 
-from __future__ import annotations
-
 import math
 import os
 import secrets

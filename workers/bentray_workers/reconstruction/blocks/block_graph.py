@@ -1,7 +1,5 @@
 """Task graph of SART of a volume in blocks: one emitter after the other, each over all blocks."""
 
-from __future__ import annotations
-
 from collections.abc import Generator
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The rays of one emitter through the blocks: where each waits, and the sums over its parts."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Tasks of SART in one block: sweeps of a travel time, parts of rays, back-projection, update."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
