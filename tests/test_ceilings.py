@@ -17,10 +17,10 @@ SOURCES = (".py", ".cl", ".js", ".css", ".html")
 # to which the ceilings are lowered as code is removed.
 LINES = {
     # folders: (ceiling, goal)
-    ("kernels", "workers", "service"): (96_110, 87_000),
-    ("service",): (33_600, 31_000),
-    ("tests",): (69_875, 58_000),
-    ("benchmarks",): (15_330, 13_000),
+    ("kernels", "workers", "service"): (91_700, 87_000),
+    ("service",): (31_630, 31_000),
+    ("tests",): (66_240, 58_000),
+    ("benchmarks",): (15_270, 13_000),
 }
 
 FILES = 28

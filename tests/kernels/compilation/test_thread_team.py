@@ -40,15 +40,15 @@ def test_grids_are_copied_as_by_one_thread(shape):
         arrays = np.empty((6, grid.size))
         for array in arrays:
             team.fill(array, -1.0)
-        grid.store(inner, arrays[0], True, scale=2.0, border=False, team=team)
-        grid.store(padded, arrays[1], False, team=team)
+        grid.copy(inner, arrays[0], True, scale=2.0, border=False, team=team)
+        grid.copy(padded, arrays[1], False, team=team)
         grid.mirror(arrays[1], arrays[2], team)
-        grid.mirror_changed(arrays[1], arrays[3], changed, team)
-        grid.mirror_changed(arrays[1], arrays[4], grid.empty_ranges(), team)
+        grid.mirror(arrays[1], arrays[3], team, changed)
+        grid.mirror(arrays[1], arrays[4], team, grid.empty_ranges())
         team.copy(arrays[1], arrays[5])
         back, inside, flipped = np.zeros(padded.size), np.zeros(inner.size), grid.empty_ranges()
-        grid.load(back, arrays[2], True, team=team)
-        grid.load(inside, arrays[0], True, border=False, team=team)
+        grid.copy(back, arrays[2], True, back=True, team=team)
+        grid.copy(inside, arrays[0], True, border=False, back=True, team=team)
         grid.mirror_mask(changed, flipped, team)
         return [*arrays, back, inside, *flipped]
 

@@ -69,7 +69,7 @@ def test_plan_is_stored_and_returned(http, dataset):
 
 
 def test_a_task_that_no_worker_can_hold_is_rejected_before_it_is_stored(http, dataset, cluster):
-    cluster.memory_bytes = 500 * 2**20
+    cluster.memory_bytes = 600 * 2**20
     body = refused(ask(http, dataset, {"nodes": 2048, "method": "gauss-newton"}), "nodes", "at most")
     assert "bytes" in body["found"]
     assert http.get("/v1/jobs").json()["jobs"] == []
