@@ -17,8 +17,8 @@ SOURCES = (".py", ".cl", ".js", ".css", ".html")
 # to which the ceilings are lowered as code is removed.
 LINES = {
     # folders: (ceiling, goal)
-    ("kernels", "workers", "service"): (91_700, 87_000),
-    ("service",): (31_630, 31_000),
+    ("kernels", "workers", "service"): (91_750, 87_000),
+    ("service",): (31_640, 31_000),
     ("tests",): (66_240, 58_000),
     ("benchmarks",): (15_270, 13_000),
 }

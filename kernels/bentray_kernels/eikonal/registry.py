@@ -1,5 +1,7 @@
 """Eikonal methods by name, and ``solve`` and ``solve_many``."""
 
+from __future__ import annotations
+
 import inspect
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor

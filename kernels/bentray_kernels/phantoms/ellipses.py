@@ -1,5 +1,7 @@
 """Phantoms of nested ellipses, sampled with area averaging."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
 

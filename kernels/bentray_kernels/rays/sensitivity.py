@@ -1,5 +1,7 @@
 """Sensitivities of travel times to the slowness of the nodes: metres of ray, as a sparse matrix."""
 
+from __future__ import annotations
+
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import csr_array

@@ -10,6 +10,8 @@ section 4.1; the Jacobi equation of geodesics of the length ds/v). Q is a number
 3-D, and |det Q| is the cross-section of the tube per unit of angle: r in homogeneous 2-D media, r² in 3-D.
 """
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Paths of the rays of one source."""
 
+from __future__ import annotations
+
 import numpy as np
 from numpy.typing import ArrayLike
 

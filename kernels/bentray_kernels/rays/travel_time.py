@@ -1,5 +1,7 @@
 """Travel times as integrals of the slowness along bent rays."""
 
+from __future__ import annotations
+
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -1,5 +1,7 @@
 """Backdrops: images behind the object, flat or on height fields, and their intersection with rays."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple

@@ -1,5 +1,7 @@
 """Cameras: the ray of each position in the image."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
 

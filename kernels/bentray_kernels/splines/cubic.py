@@ -1,5 +1,7 @@
 """Interpolating cubic B-spline of a grid, with the derivatives for ray bending."""
 
+from __future__ import annotations
+
 import numpy as np
 from numpy.typing import ArrayLike
 

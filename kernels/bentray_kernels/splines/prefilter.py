@@ -1,5 +1,7 @@
 """B-spline prefilter: coefficients of the interpolating or smoothing spline of a grid."""
 
+from __future__ import annotations
+
 import math
 from functools import cache
 

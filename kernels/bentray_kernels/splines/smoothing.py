@@ -1,5 +1,7 @@
 """Choice of the smoothing parameter λ by the discrepancy principle, and noise estimation."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 

@@ -1,5 +1,7 @@
 """Comparison of two images on one grid: errors, similarity and statistics in a region."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,5 +1,7 @@
 """Statistics of a region of an image: mean, spread, size, contrast to its surroundings, uncertainty."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

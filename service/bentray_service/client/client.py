@@ -1,5 +1,7 @@
 """The synchronous and the asynchronous client: upload a scan, run a job, download the result."""
 
+from __future__ import annotations
+
 import inspect
 import time
 from collections.abc import AsyncIterator, Callable, Coroutine, Iterator

@@ -4,6 +4,8 @@ A flow is a generator that yields steps and receives their results; errors are r
 :class:`ClientError`. ``Client`` and ``AsyncClient`` execute the same flows.
 """
 
+from __future__ import annotations
+
 import os
 import time
 from collections.abc import Callable, Generator, Iterator, Mapping

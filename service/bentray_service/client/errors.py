@@ -1,5 +1,7 @@
 """Errors of the client, with the problem returned by the service."""
 
+from __future__ import annotations
+
 import httpx
 
 from ..web.outbound import through_proxy

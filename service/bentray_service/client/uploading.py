@@ -1,5 +1,7 @@
 """The flow of an upload with tus, continued after broken connections."""
 
+from __future__ import annotations
+
 import base64
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path

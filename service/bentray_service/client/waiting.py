@@ -1,5 +1,7 @@
 """Flows that wait: for a job, by its event stream or by polling, and for a batch."""
 
+from __future__ import annotations
+
 import time
 from collections.abc import Callable
 

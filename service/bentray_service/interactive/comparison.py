@@ -1,5 +1,7 @@
 """Comparison of two images with their names and unit, and the drawing of slices on axes of Matplotlib."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any

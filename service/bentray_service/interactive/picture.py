@@ -1,5 +1,7 @@
 """A picture as bytes that a notebook shows."""
 
+from __future__ import annotations
+
 import os
 from pathlib import Path
 

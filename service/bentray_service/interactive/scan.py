@@ -1,5 +1,7 @@
 """A scan that was read or simulated: a dataset file, with its description in memory."""
 
+from __future__ import annotations
+
 import os
 import shutil
 import weakref

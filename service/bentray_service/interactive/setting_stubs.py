@@ -1,5 +1,7 @@
 """Types of the settings of jobs, for editors; ``python -m bentray_service.interactive.setting_stubs``."""
 
+from __future__ import annotations
+
 from dataclasses import Field, fields, is_dataclass
 from pathlib import Path
 from typing import Any

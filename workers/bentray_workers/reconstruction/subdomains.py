@@ -9,6 +9,8 @@ are known only when all faces of a round are compared, and Dask computes the blo
 tasks before them again. So there is neither a checkpoint nor cancellation.
 """
 
+from __future__ import annotations
+
 import concurrent.futures
 import itertools
 import math

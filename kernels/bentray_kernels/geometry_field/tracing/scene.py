@@ -1,5 +1,7 @@
 """A scene of meshes: shapes with their fields, instances, materials, ground and environment."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field
 
 import numpy as np
