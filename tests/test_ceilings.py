@@ -20,7 +20,8 @@ LINES = {
     ("kernels", "workers", "service"): (91_750, 87_000),
     ("service",): (31_640, 31_000),
     ("tests",): (66_240, 58_000),
-    ("benchmarks",): (15_270, 13_000),
+    # 70 more on 28 November: triangulations are intersected by Embree too, the better peer.
+    ("benchmarks",): (15_340, 13_000),
 }
 
 FILES = 28

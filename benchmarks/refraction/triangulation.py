@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -90,15 +90,22 @@ class Triangulation(NamedTuple):
 
 def rows(context: BenchmarkContext) -> Iterable[Row]:
     """Error and processor time of triangulations over those of direct rays, and a picture."""
-    peers, missing = available({"scikit-image": ("skimage.measure", lambda module: module.marching_cubes)})
-    pictures = []
-    for number, case in enumerate(cases()[: 1 if context.quick else None]):
-        context.progress(number, 3, case.name)
-        if not peers:
+    peers, missing = available(
+        {
+            "scikit-image": ("skimage.measure", lambda module: module.marching_cubes),
+            "Embree": ("embreex.rtcore_scene", lambda module: module),
+        }
+    )
+    pictures, chosen = [], cases()[: 1 if context.quick else None]
+    for number, case in enumerate(chosen):
+        context.progress(number, len(chosen), case.name)
+        if missing:
             for k in case.fineness:
-                yield from (Row(label, None, 1.0, ">=", "", *missing.values()) for label in labels(case, k))
+                yield from (
+                    Row(label, None, 1.0, ">=", "", "; ".join(missing.values())) for label in labels(case, k)
+                )
             continue
-        panels, found = compared(case, peers["scikit-image"], 3 if context.quick else REPEATS)
+        panels, found = compared(case, peers, 3 if context.quick else REPEATS)
         pictures.append((f"{case.name}: direct rays, and rays through triangulations".capitalize(), panels))
         yield from found
     context.save_picture("triangulation.png", lambda: sheet(pictures))
@@ -130,7 +137,7 @@ def labels(case: Case, fineness: int) -> list[str]:
     return [f"{case.name}, mesh at {fineness}x sampling, {quantity} over direct" for quantity in quantities]
 
 
-def compared(case: Case, marching_cubes: Callable[..., Any], repeats: int) -> tuple[list[Panel], list[Row]]:
+def compared(case: Case, peers: Mapping[str, Any], repeats: int) -> tuple[list[Panel], list[Row]]:
     """Pictures and rows of one volume; frames in turn, so that the machine's load meets all alike."""
     scene = Scene.build(case.spline, Layers((case.iso,), (1.0, INDEX)), bound="bernstein")
 
@@ -143,9 +150,11 @@ def compared(case: Case, marching_cubes: Callable[..., Any], repeats: int) -> tu
     built = {}
     for k in case.fineness:
         started = time.process_time()
-        mesh = triangulated(case, k, marching_cubes)
+        mesh = triangulated(case, k, peers["scikit-image"])
         built[f"{k}"] = f"{len(mesh.surface.order)} triangles, made in {time.process_time() - started:.2g} s"
+        embree = Embree(peers["Embree"], mesh.surface)
         frames[f"{k}"] = lambda mesh=mesh: meshed(case, mesh)
+        frames[f"{k} by Embree"] = lambda mesh=mesh, embree=embree: meshed(case, mesh, embree.follow)
     results = {name: frame() for name, frame in frames.items()}
     seconds = alternate(frames, repeats, time.process_time)
     truth = results["direct"].ends if case.truth is None else case.truth
@@ -155,15 +164,19 @@ def compared(case: Case, marching_cubes: Callable[..., Any], repeats: int) -> tu
     panels = [Panel(f"direct rays, {1e3 * seconds['direct']:.0f} ms", results["direct"].image)]
     made = []
     for k in built:
-        panels.append(Panel(f"mesh at {k}x sampling, {1e3 * seconds[k]:.0f} ms", results[k].image))
+        embree = f"{k} by Embree"
+        # The better intersector is the peer.
+        least = min(seconds[k], seconds[embree])
+        panels.append(Panel(f"mesh at {k}x sampling, {1e3 * least:.0f} ms", results[k].image))
         lost = float((~(off[k][used] <= 1.0)).mean())
         detail = (
-            f"{built[k]}; median distance of rays on the backdrop, nodes: mesh {error[k]:.2g}, direct "
-            f"{error['direct']:.2g}; {lost:.2%} of the mesh's are more than 1 off or lost; ms of processor "
-            f"time a frame of {PIXELS}² rays: mesh {1e3 * seconds[k]:.1f}, direct "
+            f"{built[k]}; median distance of rays on the backdrop, nodes: mesh {error[k]:.2g} (by Embree "
+            f"{error[embree]:.2g}), direct {error['direct']:.2g}; {lost:.2%} of the mesh's are more than 1 "
+            f"off or lost; ms of processor time a frame of {PIXELS}² rays: mesh by Embree "
+            f"{1e3 * seconds[embree]:.1f}, by our intersector {1e3 * seconds[k]:.1f}, direct "
             f"{1e3 * seconds['direct']:.1f}"
         )
-        ratios = [seconds[k] / seconds["direct"]]
+        ratios = [least / seconds["direct"]]
         if case.truth is not None:
             ratios.insert(0, error[k] / error["direct"])
         made += [
@@ -194,15 +207,15 @@ def triangulated(case: Case, fineness: int, marching_cubes: Callable[..., Any]) 
     return Triangulation(surface._replace(normals=normals.astype(np.float32)), corner, edge)
 
 
-def meshed(case: Case, mesh: Triangulation) -> Frame:
-    """The frame through a triangulation."""
+def meshed(case: Case, mesh: Triangulation, followed: Callable[..., None] | None = None) -> Frame:
+    """The frame through a triangulation, by our intersector or another."""
     middle = (np.arange(PIXELS) + 0.5) / PIXELS - 0.5
     u, v = (np.ravel(values) for values in np.meshgrid(middle, middle))
     pencil = np.stack([np.ones_like(u), u, v], axis=1)
     start, ahead = pencil @ case.camera.origin, pencil @ case.camera.direction
     ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
     lost = np.empty(len(u), dtype=bool)
-    follow(mesh.surface, mesh.corner, mesh.edge, SETTINGS.depth, start, ahead, lost)
+    (followed or follow)(mesh.surface, mesh.corner, mesh.edge, SETTINGS.depth, start, ahead, lost)
     plane, where = np.empty(len(u), dtype=np.int8), np.empty((len(u), 2))
     locate(case.backdrop, start, ahead, plane, where)
     plane[lost], where[lost] = -1, np.nan
@@ -214,11 +227,21 @@ def meshed(case: Case, mesh: Triangulation) -> Frame:
     return Frame(image, where * case.backdrop.edges[plane])
 
 
+@numba.njit(nogil=True, inline="always")
+def bent(normals: Any, u: float, v: float, direction: Any, within: bool) -> tuple[Any, bool]:
+    """The direction behind a face, from the weights of its corners 0 and 1, and whether that is in glass."""
+    normal = u * normals[0] + v * normals[1] + (1.0 - u - v) * normals[2]
+    normal /= math.sqrt((normal**2).sum())
+    ratio = INDEX if within else 1.0 / INDEX
+    ahead, _, passed = refracted(direction, (normal[0], normal[1], normal[2]), ratio)
+    return ahead, within != passed
+
+
 @numba.njit(nogil=True)
 def follow(
     surface: Surface, corner: Floats, edge: float, depth: int, start: Floats, ahead: Floats, lost: Any
 ) -> None:
-    """Follow rays through glass in air, with interpolated normals.
+    """Follow rays through glass in air, with interpolated normals, by our intersector.
 
     Args:
         surface, corner, edge: as ``Triangulation``.
@@ -237,12 +260,58 @@ def follow(
                 lost[n] = within
                 break
             x, y, z = x + s * d[0], y + s * d[1], z + s * d[2]
-            normal = u * surface.normals[face, 0] + v * surface.normals[face, 1]
-            normal += (1.0 - u - v) * surface.normals[face, 2]
-            normal /= math.sqrt((normal**2).sum())
-            ratio = INDEX if within else 1.0 / INDEX
-            d, _, passed = refracted(d, (normal[0], normal[1], normal[2]), ratio)
-            within = within != passed
+            d, within = bent(surface.normals[face], u, v, d, within)
         for axis, value in enumerate((x, y, z)):
             start[n, axis] = corner[axis] + edge * value
             ahead[n, axis] = d[axis]
+
+
+class Embree:
+    """The same by Embree: all rays to their next face, then all bent there."""
+
+    def __init__(self, module: Any, surface: Surface) -> None:
+        from embreex.mesh_construction import TriangleMesh as Faces
+
+        corners = np.ascontiguousarray(surface.triangles[:, :9]).reshape(-1, 3)
+        self.scene = module.EmbreeScene()
+        Faces(self.scene, corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3))
+
+    def follow(
+        self,
+        surface: Surface,
+        corner: Floats,
+        edge: float,
+        depth: int,
+        start: Floats,
+        ahead: Floats,
+        lost: Any,
+    ) -> None:
+        """As ``follow``."""
+        start -= corner
+        start /= edge
+        within, active = np.zeros(len(start), dtype=bool), np.arange(len(start))
+        lost[:] = True
+        for _ in range(depth + 1):
+            origins = (start[active] + AHEAD * ahead[active]).astype(np.float32)
+            hits = self.scene.run(origins, ahead[active].astype(np.float32), query="INTERSECT", output=True)
+            met = hits["primID"] >= 0
+            lost[active[~met]] = within[active[~met]]
+            active = active[met]
+            if not len(active):
+                break
+            found = (hits[name][met] for name in ("primID", "tfar", "u", "v"))
+            bend(surface.normals, active, *found, start, ahead, within)
+        start *= edge
+        start += corner
+
+
+@numba.njit(nogil=True)
+def bend(
+    normals: Any, rays: Any, faces: Any, s: Any, u: Any, v: Any, start: Floats, ahead: Floats, within: Any
+) -> None:
+    """Move rays to the faces that they meet, and bend them; u and v are weights of the corners 1 and 2."""
+    for k, n in enumerate(rays):
+        d = (ahead[n, 0], ahead[n, 1], ahead[n, 2])
+        start[n] += (s[k] + AHEAD) * ahead[n]
+        d, within[n] = bent(normals[faces[k]], 1.0 - u[k] - v[k], float(u[k]), d, within[n])
+        ahead[n, 0], ahead[n, 1], ahead[n, 2] = d
