@@ -22,8 +22,6 @@ COMPUTED = {
     "acquisition_picking", "any_scan", "chapter3", "chapter4", "chapter7_readings", "devices", "head_to_head",
     "published_systems", "scaling", "scoreboard", "sizing", "table5", "task_memory",
 }  # fmt: skip
-# Of a benchmark that has changed since they were measured.
-STALE = {"subdomains": "its volumes and goals are others since 2026-11-24; to be measured on idle cores"}
 # In results of devices, their names.
 NAMES = {"portable", "computing", "language", "pthread", "intel", "xeon", "processor"}
 # Words of the product in rows that were not measured since it says them otherwise.
@@ -65,9 +63,7 @@ def words_of_the_product() -> set[str]:
 
 
 @pytest.mark.parametrize("benchmark", ROWS)
-def test_labels_are_written_by_the_benchmark(benchmark: str, request: pytest.FixtureRequest) -> None:
-    if benchmark in STALE:
-        request.applymarker(pytest.mark.xfail(strict=True, reason=STALE[benchmark]))
+def test_labels_are_written_by_the_benchmark(benchmark: str) -> None:
     patterns = set(map(re.escape, texts(nodes(benchmark))))
     for node in nodes(benchmark):
         if isinstance(node, ast.JoinedStr):
