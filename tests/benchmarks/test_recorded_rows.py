@@ -17,10 +17,10 @@ ROWS = {
     if isinstance(rows := json.loads(path.read_text()), list)
 }
 
-# Goals of these are plans, values of other rows or read from tables, not numbers in their sources.
+# Goals of these are plans, values of other rows, read from tables or in proportion to cores, not in sources.
 COMPUTED = {
     "acquisition_picking", "any_scan", "chapter3", "chapter4", "chapter7_readings", "devices", "head_to_head",
-    "published_systems", "scaling", "scoreboard", "sizing", "table5", "task_memory",
+    "published_systems", "scaling", "scoreboard", "sizing", "subdomains", "table5", "task_memory",
 }  # fmt: skip
 # In results of devices, their names.
 NAMES = {"portable", "computing", "language", "pthread", "intel", "xeon", "processor"}
