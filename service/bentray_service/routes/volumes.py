@@ -72,7 +72,7 @@ async def read_style(
         ),
     ] = None,
     interpolation: Annotated[
-        Literal["nearest", "cubic"], Query(description="Interpolation between nodes.")
+        Literal["nearest", "linear", "cubic"], Query(description="Interpolation between nodes.")
     ] = "nearest",
     scale_bar: Annotated[bool, Query(description="Draw a scale bar.")] = False,
     colour_bar: Annotated[

@@ -39,6 +39,7 @@ def test_every_parameter_changes_picture_and_etag(http, here):
         {"axis": "x"},
         {"size": 300},
         {"interpolation": "cubic"},
+        {"interpolation": "linear"},
         {"scale_bar": True},
         {"colour_bar": False},
         {"frame": False},

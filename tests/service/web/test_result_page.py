@@ -1,16 +1,21 @@
 """The page of a result: values, colours, profile and region are those of the arrays; links keep the view."""
 
+import base64
 import csv
 import io
 import json
 import re
 import shlex
+from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import httpx
 import numpy as np
 import pytest
+import yaml
 from matplotlib import colormaps
 from matplotlib.path import Path as Outline
+from PIL import Image
 from playwright.sync_api import expect
 from scipy.ndimage import map_coordinates
 
@@ -21,6 +26,7 @@ from .finished_results import ORIGIN_M, SPACING_M, finished, known
 
 pytestmark = pytest.mark.browser
 
+SVG = "{http://www.w3.org/2000/svg}"
 SPEED = known((24, 16))
 DX, DY = (1e3 * step for step in SPACING_M[:2])
 X0, Y0 = (1e3 * start for start in ORIGIN_M[:2])
@@ -517,6 +523,101 @@ def test_a_result_is_renamed_exported_and_deleted(page, made):
     page.get_by_role("button", name="Delete").click()
     page.get_by_role("heading", name="Jobs").wait_for()
     assert httpx.get(own_result.replace("/#/jobs/", "/v1/jobs/")).status_code == 404
+
+
+def test_two_quantities_lie_over_each_other_and_values_between_nodes_are_interpolated(page, result):
+    """By keys alone; the address keeps it; colours, read-out and bars are those of both arrays."""
+    ready(page, result + "?window=1430,1570&over-window=0.5,1.5")
+    page.locator("#skip").focus()
+    tab_to(page, page.get_by_label("Overlay", exact=True))
+    page.keyboard.type("Attenuation")
+    tab_to(page, page.get_by_label("Opacity"))
+    page.keyboard.press("ArrowRight")
+    tab_to(page, page.get_by_label("Overlay from"))
+    page.keyboard.type("0.5")
+    tab_to(page, page.get_by_label("Overlay to"))
+    page.keyboard.type("1.5")
+    tab_to(page, page.get_by_label("Clear below the window"))
+    page.keyboard.press("Space")
+    page.wait_for_url(re.compile("over=attenuation&opacity=0.55&over-window=0.5%2C1.5&clear=1"))
+    page.reload()
+    page.locator(".readout").filter(has_text="mm").wait_for()
+    expect(page.locator(".colour-bar .unit")).to_have_text(
+        ["sound speed (m/s)", "attenuation, experimental (dB/cm)"]
+    )
+    canvas, seen = page.locator("canvas.plane"), set()
+    for place in ((0.35, 0.3), (0.42, 0.71), (0.62, 0.6)):
+        node, value, _ = node_below(page, *place)
+        above = MORE["attenuation"][node] * 0.0868588963806
+        expect(page.locator(".readout")).to_contain_text(f"Speed: {value:.2f} m/s")
+        expect(page.locator(".readout")).to_contain_text(f"Attenuation: {above:.4f} dB/cm")
+        grey, colour = colour_of(value, 1430.0, 1570.0, "gray"), colour_of(above, 0.5, 1.5, "plasma")
+        mixed = np.add(np.multiply(grey, 0.45), np.multiply(colour, 0.55)) if above >= 0.5 else grey
+        np.testing.assert_allclose(drawn(page, *place, canvas), mixed, atol=2)
+        seen.add(above >= 0.5)
+    assert seen == {True, False}
+    page.get_by_label("Overlay", exact=True).select_option("none")
+    expect(page.locator(".colour-bar")).to_have_count(1)
+    page.locator("select[name=map]").select_option("viridis")
+    page.get_by_label("Between nodes").select_option("linear")
+    page.wait_for_url(re.compile("interpolation=linear"))
+    redrawn(page)
+    nearest = []
+    for place in ((0.455, 0.3), (0.53, 0.73), (0.62, 0.57)):
+        _, value, (x, y) = node_below(page, *place)
+        between = map_coordinates(SPEED, [[(x - X0) / DX], [(y - Y0) / DY]], order=1)[0]
+        expected = np.array(colour_of(between, 1430.0, 1570.0), int)
+        np.testing.assert_allclose(drawn(page, *place, canvas), expected, atol=4)
+        nearest.append(np.abs(expected - colour_of(value, 1430.0, 1570.0)).max())
+    assert max(nearest) > 20
+
+
+def test_a_figure_shows_the_view_with_caption_and_marks(page, result):
+    page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    ready(page, result + "?window=1430,1570&ellipse=-8,-15,0,-5&measures=distance,z,-5,-10,0,5,5,0")
+    page.get_by_text("Export", exact=True).click()
+
+    def exported(kind, name):
+        with page.expect_download() as download:
+            page.get_by_role("button", name=name).click()
+        assert download.value.suggested_filename.endswith(kind)
+        return download.value.path()
+
+    svg = ET.parse(exported(".svg", "SVG")).getroot()
+    texts = ["".join(text.itertext()) for text in svg.iter(f"{SVG}text")]
+    ticks = {"1450", "1500", "1550"}
+    assert {"x (mm)", "y (mm)", "sound speed (m/s)", "18.03 mm", *ticks} <= set(texts)
+    caption = " ".join(texts)
+    for part in ("nodes of 1 mm", "water 1500.0 m/s", "Bentray test", "no standard deviations"):
+        assert part in caption
+    assert len(list(svg.iter(f"{SVG}ellipse"))) == 2
+    # The image has its pixels where the axes say.
+    (image,) = svg.iter(f"{SVG}image")
+    pixels = Image.open(io.BytesIO(base64.b64decode(image.get("href").partition(",")[2])))
+    for node in ((3, 4), (20, 11)):
+        place = [(k + 0.5) / n * side for k, n, side in zip(node, SPEED.shape, pixels.size, strict=True)]
+        found = pixels.getpixel((int(place[0]), pixels.height - 1 - int(place[1])))
+        assert list(found[:3]) == colour_of(SPEED[node], 1430.0, 1570.0)
+    with Image.open(exported(".png", "PNG, 300 dpi")) as picture:
+        sides = [float(svg.get(side)) * 300 / 96 for side in ("width", "height")]
+        assert picture.size == tuple(map(round, sides))
+        # Much of the figure is the image in its colours.
+        assert len(picture.convert("RGB").getcolors(2**24)) > 200
+    page.get_by_label("With what is measured").uncheck()
+    bare = ET.parse(exported(".svg", "SVG")).getroot()
+    assert not list(bare.iter(f"{SVG}ellipse"))
+    assert "18.03 mm" not in "".join(bare.itertext())
+    copied(page, "Copy caption")
+    assert caption.endswith(page.evaluate("navigator.clipboard.readText()"))
+    copied(page, "Copy BibTeX")
+    bibtex = page.evaluate("navigator.clipboard.readText()")
+    citation = yaml.safe_load((Path(__file__).parents[3] / "CITATION.cff").read_text())
+    (thesis,) = citation["references"]
+    (author,) = thesis["authors"]
+    names = [author["family-names"] + ", " + author["given-names"], citation["authors"][0]["name"]]
+    for part in (*names, citation["title"], thesis["title"], thesis["institution"]["name"], thesis["year"]):
+        assert f"{{{part}}}" in bibtex
+    assert "version = {test}" in bibtex
 
 
 @pytest.mark.nightly

@@ -79,7 +79,7 @@ def test_a_constant_image_is_drawn(tmp_path):
     [
         ({"quantity": "mass"}, "quantity", "speed, coverage"),
         ({"colormap": "jet"}, "colormap", "viridis"),
-        ({"interpolation": "linear"}, "interpolation", "cubic"),
+        ({"interpolation": "sinc"}, "interpolation", "cubic"),
         ({"size": 199}, "size", "200"),
         ({"size": 31, "frame": False}, "size", "32"),
         ({"size": 4097}, "size", "4096"),

@@ -7,7 +7,7 @@ from bentray_kernels.requests.ranges import Range
 
 COLORMAPS = ("viridis", "magma", "inferno", "plasma", "cividis", "gray", "bone", "turbo", "coolwarm")
 # Interpolation between nodes, and its name in Matplotlib.
-INTERPOLATIONS = {"nearest": "nearest", "cubic": "bicubic"}
+INTERPOLATIONS = {"nearest": "nearest", "linear": "bilinear", "cubic": "bicubic"}
 MIN_SIZE, MAX_SIZE = 32, 4096
 # With a frame; text is illegible below this.
 MIN_FRAMED_SIZE = 200

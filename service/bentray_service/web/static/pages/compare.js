@@ -1,7 +1,8 @@
 // Two to four results with one range of colours and one cursor: side by side, as difference, or with a border to swipe.
 import { keepQuery } from "../parts/address.js";
+import { FigureExport, undrawn } from "../parts/export_menu.js";
 import { facts, loadResult, nameOf } from "../parts/result_tables.js";
-import { html } from "../parts/view.js";
+import { html, Menu } from "../parts/view.js";
 import { stateOf } from "../viewer/state.js";
 import { Viewer } from "../viewer/viewer.js";
 
@@ -16,14 +17,20 @@ export async function open({ id, query }) {
   if (dimensions.size > 1) throw new Error("An image and a volume cannot be compared");
   document.title = "Comparison – Bentray";
   const panes = results.map(({ job, values, summary }, k) => ({ title: `${LETTERS[k]} ${job.title}`, values, stored: summary.quantities }));
+  const drawn = undrawn();
   return html`<div class="wide screen">
-    <div class="head"><h1>Comparison</h1></div>
+    <div class="head">
+      <h1>Comparison</h1>
+      <div id="result-actions" class="links">
+        <${Menu} title="Export" className="export"><div class="sheet"><${FigureExport} drawn=${drawn} results=${results} name="comparison" /></div></${Menu}>
+      </div>
+    </div>
     <ol class="compared">
       ${results.map((result, k) => html`<li class="line">
         <a href=${`#/jobs/${result.job.id}`}>${LETTERS[k]}: ${nameOf(result)}</a>
         <span class="facts"> ${facts(result)}</span>
       </li>`)}
     </ol>
-    <${Viewer} panes=${panes} state=${stateOf(query)} keep=${keepQuery} aria-label="Images" />
+    <${Viewer} panes=${panes} state=${stateOf(query)} keep=${keepQuery} drawn=${drawn} aria-label="Images" />
   </div>`;
 }

@@ -3,7 +3,7 @@ import { Thumbnail } from "../jobs/job_cards.js";
 import { Onward, onwardIn } from "../jobs/onward.js";
 import { go, keepQuery, parse, queryOf } from "../parts/address.js";
 import { kept, request, send } from "../parts/api.js";
-import { ExportMenu } from "../parts/export_menu.js";
+import { ExportMenu, undrawn } from "../parts/export_menu.js";
 import { deleteRecord } from "../parts/lists.js";
 import { Provenance } from "../parts/provenance.js";
 import { ChoiceTable, facts, loadResult, nameOf, PlanTable, TruthTable } from "../parts/result_tables.js";
@@ -66,6 +66,7 @@ function Rename({ job, onRename }) {
 function Result({ result: first, query }) {
   const [job, setJob] = useState(first.job);
   const [state] = useState(() => stateOf(query));
+  const [drawn] = useState(undrawn);
   const [renaming, setRenaming] = useState(false);
   const [error, act] = useAct();
   const result = { ...first, job };
@@ -90,7 +91,7 @@ function Result({ result: first, query }) {
       <h1 id="result-name">${name}</h1>
       <div id="result-actions" class="links">
         <${CompareMenu} job=${job} />
-        <${ExportMenu} result=${result} state=${state} />
+        <${ExportMenu} result=${result} drawn=${drawn} />
         <a class="button quiet" href=${`#/scans/${job.dataset}?from=${job.id}`}>Run again with changes</a>
         <${Menu} title="More">
           <div class="sheet">
@@ -110,7 +111,7 @@ function Result({ result: first, query }) {
     ${renaming && html`<${Rename} job=${job} onRename=${rename} />`}
     <${Alert} id="result-error" error=${error} />
     <${Onward} job=${job} summary=${summary} query=${query}>
-      <${Viewer} panes=${[{ title: name, values, stored: summary.quantities, detail: width && 1e3 * width }]} state=${state} keep=${keep} id="result-viewer" aria-label="Image" />
+      <${Viewer} panes=${[{ title: name, values, stored: summary.quantities, detail: width && 1e3 * width }]} state=${state} keep=${keep} drawn=${drawn} id="result-viewer" aria-label="Image" />
     </${Onward}>
   </div>
   <div class="wide">

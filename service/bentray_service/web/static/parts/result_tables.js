@@ -20,14 +20,25 @@ export function nameOf({ job, volume }) {
   return job.name || volume.title || job.id;
 }
 
-// The result in a line.
-export function facts({ job, volume, summary }) {
-  const size = volume.shape.join(" × ");
+// Method, grid and water.
+function makingOf({ job, volume }) {
   const spacing = volume.spacing_m[0] === null ? "" : ` of ${Number((1e3 * volume.spacing_m[0]).toPrecision(3))} mm`;
+  return [volume.provenance.made_by ?? job.title, `${volume.shape.join(" × ")} nodes${spacing}`, `water ${volume.water_speed_mps.toFixed(1)} m/s`];
+}
+
+// What the caption of a figure says of the result.
+export function captionOf(result) {
+  const { trust, cautions } = result.summary;
+  const making = `Image by ${makingOf(result).join(", ")}, Bentray ${result.volume.provenance.bentray}.`;
+  return [making, `Uncertainty: ${trust}.`, ...cautions.map(({ text }) => text)].join(" ");
+}
+
+// The result in a line.
+export function facts(result) {
+  const { job, summary: { truth, trust } } = result;
   const residual = job.history.at(-1)?.residual_rms_s;
-  const { truth, trust } = summary;
   return [
-    trust, volume.provenance.made_by ?? job.title, `${size} nodes${spacing}`, `water ${volume.water_speed_mps.toFixed(1)} m/s`,
+    trust, ...makingOf(result),
     residual && `residual ${inNanoseconds(residual)}`,
     truth?.rmse_mps != null && `error ${truth.rmse_mps.toFixed(2)} m/s rms (${truth.region})`,
     job.seconds !== null && `took ${duration(job.seconds)}`,

@@ -1,5 +1,5 @@
 // Colour maps, 256 colours each: the tables of Matplotlib as the images of the service use them; and the colour bar below images.
-import { html, useLayoutEffect, useRef } from "../parts/view.js";
+import { html, useMemo } from "../parts/view.js";
 import { ticks } from "./plot.js";
 
 // Hexadecimal colours without separators, by the name of the map; see test_colormaps.py.
@@ -24,20 +24,28 @@ export function coloursOf(name) {
   return made.get(name);
 }
 
-const sideOf = (share) => (share < 0.05 ? "first" : share > 0.95 ? "last" : "");
+const anchorOf = (share) => (share < 0.05 ? "start" : share > 0.95 ? "end" : "middle");
+
+// The colours of a map with round values below them, as SVG that needs no style sheet. width: pixels; without it all of the width there is.
+export function Strip({ low, high, map, width = null }) {
+  const stops = useMemo(() => Array.from({ length: 256 }, (_, k) => (
+    html`<stop offset=${(k + 0.5) / 256} stop-color=${`#${TABLES[map].slice(6 * k, 6 * k + 6)}`} />`
+  )), [map]);
+  const at = (share) => (width ? share * width : `${100 * share}%`);
+  return html`
+    <linearGradient id=${`colours-${map}`}>${stops}</linearGradient>
+    <rect width=${at(1)} height="18" fill=${`url(#colours-${map})`} stroke="#888" stroke-width="0.5" />
+    ${ticks(low, high, COUNT).map((value) => {
+      const share = (value - low) / (high - low);
+      return html`<line x1=${at(share)} x2=${at(share)} y1="18" y2="23" stroke="#888" /><text x=${at(share)} y="36" text-anchor=${anchorOf(share)}>${value}</text>`;
+    })}`;
+}
 
 // words: of the quantity and its unit.
 export function ColourBar({ low, high, map, words, hidden = false }) {
-  const strip = useRef(null);
-  useLayoutEffect(() => {
-    const image = new ImageData(256, 1);
-    new Uint32Array(image.data.buffer).set(coloursOf(map));
-    strip.current.getContext("2d").putImageData(image, 0, 0);
-  }, [map]);
-  const marks = ticks(low, high, COUNT).map((value) => [value, (value - low) / (high - low)]);
   return html`<div class="colour-bar" hidden=${hidden}>
-    <canvas width="256" height="1" ref=${strip} role="img" aria-label=${`Colours from ${Number(low.toPrecision(5))} to ${Number(high.toPrecision(5))}`}></canvas>
-    <div class="ticks">${marks.map(([value, share]) => html`<span class=${sideOf(share)} style=${{ left: `${100 * share}%` }}>${value}</span>`)}</div>
+    <svg role="img" aria-label=${`Colours from ${Number(low.toPrecision(5))} to ${Number(high.toPrecision(5))}`}>
+      <${Strip} low=${low} high=${high} map=${map} /></svg>
     <p class="unit">${words}</p>
   </div>`;
 }

@@ -2,9 +2,11 @@
 import { Button, html, Options, useLayoutEffect, useRef } from "../parts/view.js";
 import { NAMES } from "./colour_bar.js";
 import { AXES } from "./field.js";
-import { TOOLS, WHOLE_VIEWS } from "./state.js";
+import { INTERPOLATIONS, TOOLS, WHOLE_VIEWS } from "./state.js";
 
 const MAPS = NAMES.map((name) => [name, name === "RdBu_r" ? "blue–red" : name]);
+
+export const percent = (share) => `${Math.round(100 * share)} %`;
 
 // A row of buttons of which one is pressed. entries: [name, title].
 export function ChoiceBar({ label, className, entries, chosen, onChoose }) {
@@ -63,23 +65,45 @@ export function Tools({ tool, change }) {
   </fieldset>`;
 }
 
-// setWindow(low, high) takes only sensible limits; fades and sliced: whether the image can be faded and shown in three planes.
-export function Window({ low, high, map, fade, planes, fades, sliced, setWindow, change }) {
+// The window and the map of colours: onWindow([low, high]), or null for the automatic one; onMap(name). before: of the labels.
+export function Colours({ title, before = "", low, high, map, onWindow, onMap, children }) {
   const set = (event) => {
     const { elements } = event.target.closest("fieldset");
-    setWindow(elements.low.valueAsNumber, elements.high.valueAsNumber);
+    onWindow([elements.low.valueAsNumber, elements.high.valueAsNumber]);
   };
   const limit = (value) => Number(value.toPrecision(6));
   return html`<fieldset class="window">
-    <legend class="caption">Window</legend>
-    <label>from <${NumberField} name="low" value=${limit(low)} onChange=${set} /></label>
-    <label>to <${NumberField} name="high" value=${limit(high)} onChange=${set} /></label>
-    <${Button} onClick=${() => change({ window: null })}>Automatic</${Button}>
-    <label>Colours <select name="map" value=${map} onChange=${({ target }) => change({ map: target.value })}><${Options} entries=${MAPS} /></select></label>
-    <${Button} onClick=${() => change({ views: WHOLE_VIEWS })}>Whole image</${Button}>
-    <label class="fade" hidden=${!fades}><input type="checkbox" name="fade" checked=${fade} onChange=${({ target }) => change({ fade: target.checked })} /> Fade what is not known</label>
-    <label class="planes" hidden=${!sliced}><input type="checkbox" name="planes" checked=${planes} onChange=${({ target }) => change({ planes: target.checked })} /> Three planes</label>
+    <legend class="caption">${title}</legend>
+    <label>${before}from <${NumberField} name="low" value=${limit(low)} onChange=${set} /></label>
+    <label>to <${NumberField} name="high" aria-label=${`${before}to`} value=${limit(high)} onChange=${set} /></label>
+    <${Button} onClick=${() => onWindow(null)}>Automatic</${Button}>
+    <label>Colours <select name="map" value=${map} onChange=${({ target }) => onMap(target.value)}><${Options} entries=${MAPS} /></select></label>
+    ${children}
   </fieldset>`;
+}
+
+// A box that sets a field of the state. hidden: where it has no effect.
+export const Switch = ({ name, state, change, hidden, children }) => html`<label class=${name} hidden=${hidden}>
+  <input type="checkbox" name=${name} checked=${state[name]} onChange=${({ target }) => change({ [name]: target.checked })} /> ${children}</label>`;
+
+// How the image is drawn; fades and sliced: whether it can be faded and shown in three planes.
+export function Drawing({ state, fades, sliced, change }) {
+  return html`
+    <label>Between nodes <select name="interpolation" onChange=${({ target }) => change({ interpolation: target.value })}>
+      <${Options} entries=${INTERPOLATIONS} chosen=${state.interpolation} /></select></label>
+    <${Button} onClick=${() => change({ views: WHOLE_VIEWS })}>Whole image</${Button}>
+    <${Switch} name="fade" state=${state} change=${change} hidden=${!fades}>Fade what is not known</${Switch}>
+    <${Switch} name="planes" state=${state} change=${change} hidden=${!sliced}>Three planes</${Switch}>`;
+}
+
+// What lies above the image, and how opaque it is. entries: [name, title] of the quantities to choose from.
+export function Overlay({ entries, state: { over, opacity }, change }) {
+  const choose = ({ target }) => change({ over: target.value || null, overWindow: null, overMap: null, clear: false });
+  return html`<div class="overlay">
+    <label>Overlay <select name="over" aria-label="Overlay" onChange=${choose}><${Options} entries=${[["", "none"], ...entries]} chosen=${over ?? ""} /></select></label>
+    ${over && html`<label><span>Opacity</span> <input type="range" name="opacity" aria-label="Opacity" min="0" max="1" step="0.05" value=${opacity} aria-valuetext=${percent(opacity)}
+      onInput=${({ target }) => change({ opacity: Number(target.value) })} /> <output>${percent(opacity)}</output></label>`}
+  </div>`;
 }
 
 export function Keys() {

@@ -89,6 +89,38 @@ export function interpolated(plane, x, y) {
   return mixed(mixed(at(a, b), at(a, b + 1), q), mixed(at(a + 1, b), at(a + 1, b + 1), q), p);
 }
 
+// Nodes of a plane with more nodes at most, and how many times as many along an axis.
+const [FINE_NODES, FINEST] = [2 ** 20, 8];
+const fine = new WeakMap();
+
+// The same plane with more nodes, linear between those that it has; beyond the outer ones, and beside missing values, as at the nearest one.
+export function refined(plane) {
+  if (!fine.has(plane)) fine.set(plane, refine(plane));
+  return fine.get(plane);
+}
+
+function refine(plane) {
+  const { na, nb, values } = plane;
+  const factor = Math.min(FINEST, Math.max(1, Math.floor(Math.sqrt(FINE_NODES / (na * nb)))));
+  const spacing = plane.spacing.map((step) => step / factor);
+  const origin = plane.origin.map((start, k) => start - plane.spacing[k] / 2 + spacing[k] / 2);
+  // Of each new node along an axis: the two old ones around it, and the share of the second.
+  const between = (count) => Array.from({ length: count * factor }, (_, k) => {
+    const position = Math.min(count - 1, Math.max(0, (k + 0.5) / factor - 0.5));
+    return [Math.floor(position), Math.ceil(position), position % 1];
+  });
+  const alongB = between(nb);
+  const finer = new Float64Array(na * nb * factor ** 2);
+  let number = 0;
+  for (const [a, a1, p] of between(na)) {
+    for (const [b, b1, q] of alongB) {
+      const value = (1 - p) * ((1 - q) * values[a * nb + b] + q * values[a * nb + b1]) + p * ((1 - q) * values[a1 * nb + b] + q * values[a1 * nb + b1]);
+      finer[number++] = Number.isFinite(value) ? value : values[(p < 0.5 ? a : a1) * nb + (q < 0.5 ? b : b1)];
+    }
+  }
+  return { ...plane, na: na * factor, nb: nb * factor, spacing, origin, values: finer };
+}
+
 // The limits of a plane with the halves of the cells at its border, mm: [left, right, bottom, top].
 export function extent({ na, nb, spacing, origin }) {
   return [

@@ -26,9 +26,9 @@ function decades(low, high) {
 export function Axes({ box: [left, top, right, bottom], px, py, x, y, wordsOf = String, words, height, margin }) {
   const middle = (top + bottom) / 2;
   return html`
-    ${x.map((value) => html`<line class="grid" x1=${px(value)} x2=${px(value)} y1=${top} y2=${bottom} />
+    ${x.map((value) => html`<line class="grid" stroke="#888" x1=${px(value)} x2=${px(value)} y1=${top} y2=${bottom} />
       <text x=${px(value)} y=${bottom + 15} text-anchor="middle">${wordsOf(value)}</text>`)}
-    ${y.map((value) => html`<line class="grid" x1=${left} x2=${right} y1=${py(value)} y2=${py(value)} />
+    ${y.map((value) => html`<line class="grid" stroke="#888" x1=${left} x2=${right} y1=${py(value)} y2=${py(value)} />
       <text x=${left - 6} y=${py(value) + 4} text-anchor="end">${value}</text>`)}
     <text x=${(left + right) / 2} y=${height - 6} text-anchor="middle">${words[0]}</text>
     <text x=${margin} y=${middle} text-anchor="middle" transform=${`rotate(-90 ${margin} ${middle})`}>${words[1]}</text>`;

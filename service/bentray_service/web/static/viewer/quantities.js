@@ -35,6 +35,9 @@ export const QUANTITIES = {
   truth: { title: "Truth", words: "true sound speed", unit: "m/s", map: "viridis", digits: 2, reads: ["truth"] },
 };
 
+// The map of a quantity above another one, which is grey: with no grey in it.
+export const overMapOf = ({ map }) => (["gray", "bone", "cividis"].includes(map) ? "plasma" : map);
+
 // A number with the digits of its quantity.
 export function shown(value, { digits }) {
   if (!Number.isFinite(value)) return "no value";

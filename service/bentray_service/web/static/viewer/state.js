@@ -9,6 +9,8 @@ export const TOOLS = {
   ellipse: "Ellipse",
 };
 export const MODES = { side: "Side by side", difference: "Difference", swipe: "Swipe" };
+// Between nodes.
+export const INTERPOLATIONS = ["nearest", "linear"];
 const MOST_ZOOM = 64;
 const NOTHING = [];
 // Of a plane whose whole image is shown, and of all planes.
@@ -54,6 +56,12 @@ const FIELDS = {
   quantity: ["q", "speed", oneOf(Object.keys(QUANTITIES))],
   map: ["map", null, oneOf(NAMES)],
   window: ["window", null, listOf(2, ([low, high]) => low < high)],
+  interpolation: ["interpolation", "nearest", oneOf(INTERPOLATIONS)],
+  over: ["over", null, oneOf(Object.keys(QUANTITIES))],
+  opacity: ["opacity", 0.5, number((value) => value >= 0 && value <= 1)],
+  overMap: ["over-map", null, oneOf(NAMES)],
+  overWindow: ["over-window", null, listOf(2, ([low, high]) => low < high)],
+  clear: ["clear", false, flag("1")],
   axis: ["axis", "z", oneOf([...AXES])],
   planes: ["planes", false, flag("3")],
   fade: ["fade", false, flag("1")],

@@ -56,7 +56,7 @@ function actionsOf({ key, axis }, image, { main, state, window, change, setWindo
     shift(by, spread, [low, high] = window) {
       const half = ((high - low) / 2) * spread;
       const level = (low + high) / 2 + by * (high - low);
-      setWindow(level - half, level + half);
+      setWindow([level - half, level + half]);
     },
     // drag: the press and what was shown then; ended: whether this is its last point.
     dragTo(drag, [px, py], ended) {

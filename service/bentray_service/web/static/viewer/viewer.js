@@ -1,11 +1,11 @@
 // Results on canvases with one range of colours and one cursor: quantities, planes, window, profile, region.
-import { Alert, html, useEffect, useLater, useMemo, useRead, useReducer, useState } from "../parts/view.js";
+import { Alert, html, useEffect, useLater, useMemo, useRead, useReducer, useRef, useState } from "../parts/view.js";
 import { ColourBar } from "./colour_bar.js";
-import { ChoiceBar, Keys, Slices, Swipe, Tools, Window } from "./controls.js";
+import { ChoiceBar, Colours, Drawing, Keys, Overlay, percent, Slices, Swipe, Switch, Tools } from "./controls.js";
 import { AXES, nodeAt, shownPlane } from "./field.js";
 import { flat, inPlane, MEASURES, robustLimits, valueOf } from "./measures.js";
 import { Measures } from "./measures_panel.js";
-import { FADED, QUANTITIES, shown, shownOf } from "./quantities.js";
+import { FADED, overMapOf, QUANTITIES, shown, shownOf } from "./quantities.js";
 import { MODES, queryOfState } from "./state.js";
 import { Tile } from "./tile.js";
 
@@ -30,11 +30,12 @@ function limitsOf({ limits, symmetric, least }, fields, tiles, cursor, comparing
   return comparing || symmetric ? [-reach, reach] : limits ?? [least ?? low, high];
 }
 
-// The values of the quantity of the state, read anew when it changes: { read, words, error }. read: { quantity, fields, spread }, a field for each
-// pane and the standard deviations of the only one, or null; words: how far they are read, "" once they are.
+// The values of the quantities of the state, read anew when they change: { read, words, error }. read: { quantity, fields, spread, over, above }, a
+// field for each pane; the standard deviations of the only one, or null; the name and the field of what lies above it, or null; words: how far
+// they are read, "" once they are.
 function useFields(panes, state) {
   const [found, setFound] = useState({ read: null, words: "", error: null });
-  const { quantity } = state;
+  const { quantity, over } = state;
   const fading = state.fade && fades(panes, quantity);
   useEffect(() => {
     let newest = true;
@@ -46,20 +47,20 @@ function useFields(panes, state) {
         shares[k] = share;
         say({ words: `Reading the values, ${Math.floor((100 * shares.reduce((a, b) => a + b)) / shares.length)} %` });
       })));
-      const spread = fading ? await panes[0].values.field("uncertainty") : null;
+      const [spread, above] = await Promise.all([fading && "uncertainty", over].map((name) => (name ? panes[0].values.field(name) : null)));
       if (!newest) return;
       const [main] = fields;
       state.counted = main.uneven;
       state.cursor ??= [0, 1, 2].map((k) => (k < main.dimension ? main.position(AXES[k], Math.floor(main.shape[k] / 2)) : 0));
       if (!main.axes.includes(state.axis)) state.axis = "z";
       if (panes.length > 1 || main.axes.length === 1) state.planes = false;
-      say({ read: { quantity, fields, spread }, words: "" });
+      say({ read: { quantity, fields, spread, over, above }, words: "" });
     }
     readAll().catch((error) => say({ words: "", error }));
     return () => {
       newest = false;
     };
-  }, [quantity, fading]);
+  }, [quantity, over, fading]);
   return found;
 }
 
@@ -76,8 +77,8 @@ function valueAt(plane, x, y) {
 }
 
 // Position, node and value under the pointer or the cursor, in a line. tile: the image; place: in it, mm; other: whether the right one of two images is shown there; spoken: whether a key moved the cursor;
-// apart: whether each pane is read.
-function Readout({ quantity, fields, panes, cursor, tile, place: [x, y], other, spoken, apart }) {
+// apart: whether each pane is read; over: the quantity and the field of what lies above, or null.
+function Readout({ quantity, fields, panes, cursor, tile, place: [x, y], other, spoken, apart, over }) {
   const { axis, number } = tile;
   const field = fields[number];
   const plane = shownPlane(fields, tile, cursor);
@@ -87,11 +88,13 @@ function Readout({ quantity, fields, panes, cursor, tile, place: [x, y], other, 
   const slice = field.nearest(axis, cursor[k]);
   if (field.dimension === 3 && !(field.uneven && axis === "z")) words.splice(k, 0, `${axis} ${field.position(axis, slice).toFixed(2)} mm`);
   const { node, value } = valueAt(other ? fields[tile.other].planeAt(axis, cursor) : plane, x, y);
-  const worded = (found) => `${shown(found, quantity)} ${quantity.unit}`;
+  const worded = (found, of = quantity) => `${shown(found, of)} ${of.unit}`;
   if (apart) {
     panes.forEach(({ title }, pane) => words.push(`${title}: ${worded(valueAt(fields[pane].planeAt(axis, cursor), x, y).value)}`));
   } else {
-    words.push(worded(value));
+    const named = ({ title }) => (over ? `${title.split(" (")[0]}: ` : "");
+    words.push(named(quantity) + worded(value));
+    if (over) words.push(named(over) + worded(valueAt(over.field.planeAt(axis, cursor), x, y).value, over));
     if (node) words.push(`node ${(field.dimension === 3 ? [...node.slice(0, k), slice, ...node.slice(k)] : node).join(", ")}`);
   }
   return html`<p class="readout" aria-live=${spoken ? "polite" : "off"} data-value=${value} data-x=${x} data-y=${y} data-node=${node ? node.join(",") : ""}>
@@ -99,9 +102,25 @@ function Readout({ quantity, fields, panes, cursor, tile, place: [x, y], other, 
   </p>`;
 }
 
+// What is shown, for the caption of a figure. bars: of colours; look: of the first image.
+function viewInWords({ planes, axis, cursor, over, opacity, clear, interpolation }, bars, main, look) {
+  const at = (of) => `${of} = ${Number(main.position(of, main.nearest(of, cursor[AXES.indexOf(of)])).toFixed(2))}${main.uneven ? "" : " mm"}`;
+  const [{ low, words }] = bars.slice(-1);
+  const parts = [
+    bars[0].words,
+    over && `with ${words} above it, opacity ${percent(opacity)}${clear ? `, clear below ${Number(low.toPrecision(4))}` : ""}`,
+    main.dimension === 3 && (planes ? `planes at ${main.axes.map(at).join(", ")}` : `slice at ${at(axis)}`),
+    look.other && "border between two images",
+    look.deviations && "the more transparent the less certain",
+    interpolation === "linear" && "linear between nodes",
+  ].filter(Boolean).join("; ");
+  return parts[0].toUpperCase() + parts.slice(1);
+}
+
 // The images and what is measured in them, once there are values.
-function Body({ read, panes, state, change }) {
+function Body({ read, panes, state, change, drawn }) {
   const [{ at: hover, spoken }, setHover] = useState({ at: null, spoken: false });
+  const images = useRef(null);
   const { fields, spread } = read;
   const [main] = fields;
   const { cursor } = state;
@@ -111,13 +130,22 @@ function Body({ read, panes, state, change }) {
   // Measured anew for another arrangement, and not for another slice.
   const automatic = useMemo(() => limitsOf(quantity, fields, tiles, cursor, comparing), [read, state.mode, state.other, comparing && state.axis]);
   const [low, high] = state.window ?? automatic;
-  const map = state.map ?? (comparing ? "RdBu_r" : quantity.map);
+  const over = useMemo(() => {
+    if (!read.above) return null;
+    const above = QUANTITIES[read.over];
+    return { ...above, field: read.above, automatic: limitsOf(above, [read.above]) };
+  }, [read]);
+  const [overLow, overHigh] = state.overWindow ?? over?.automatic ?? [];
+  const map = state.map ?? (comparing ? "RdBu_r" : over ? "gray" : quantity.map);
+  const overMap = over && (state.overMap ?? overMapOf(over));
   const truth = useBeside("truth", panes, read.quantity, state);
   const deviations = useBeside("uncertainty", panes, read.quantity, state);
 
-  function setWindow(from, to) {
-    if (Number.isFinite(from) && Number.isFinite(to) && to - from > 1e-9 * Math.max(Math.abs(from), Math.abs(to), 1e-30)) change({ window: [from, to] });
-  }
+  // Takes only sensible limits; null for the automatic ones.
+  const windowSetter = (name) => (limits) => {
+    const [from, to] = limits ?? [];
+    if (!limits || (Number.isFinite(from) && Number.isFinite(to) && to - from > 1e-9 * Math.max(Math.abs(from), Math.abs(to), 1e-30))) change({ [name]: limits });
+  };
 
   // Measures that have a point in the slice of a tile, and the one that is being set, to the pointer or the cursor.
   function marksOf({ axis, key }) {
@@ -147,7 +175,9 @@ function Body({ read, panes, state, change }) {
     };
     const other = tile.other ? fields[tile.other].planeAt(axis, cursor) : null;
     const fading = spread?.planeAt(axis, cursor) ?? null;
-    return { plane: shownPlane(fields, tile, cursor), other, swipe: state.swipe, deviations: fading, low, high, map, marks, ...state.views[axis] };
+    const { swipe, interpolation, opacity, clear } = state;
+    const above = over && { plane: over.field.planeAt(axis, cursor), low: overLow, high: overHigh, map: overMap, clear };
+    return { plane: shownPlane(fields, tile, cursor), other, swipe, deviations: fading, low, high, map, marks, over: above, opacity, interpolation, ...state.views[axis] };
   }
 
   const curves = tiles.filter((tile) => tile.axis === state.axis).flatMap((tile) => [
@@ -156,29 +186,43 @@ function Body({ read, panes, state, change }) {
   ]);
   const pointed = tiles.find((tile) => tile.key === hover?.key);
   const readAt = pointed ? hover.place : inPlane(tiles[0].axis).map((k) => cursor[k]);
+  const setWindow = windowSetter("window");
   const actions = { main, state, window: [low, high], change, setWindow, setHover };
   const axes = [...new Set(tiles.map((tile) => tile.axis))].filter((axis) => main.count(axis) > 1);
   const moveSlice = (axis, index) => {
     cursor[AXES.indexOf(axis)] = main.position(axis, index);
     change({});
   };
-  const words = `${comparing ? "difference of " : ""}${quantity.words}${quantity.unit ? ` (${quantity.unit})` : ""}`;
+  const inUnit = ({ words, unit }) => `${words}${unit ? ` (${unit})` : ""}`;
+  const bars = [{ low, high, map, words: `${comparing ? "difference of " : ""}${inUnit(quantity)}` }];
+  if (over) bars.push({ low: overLow, high: overHigh, map: overMap, words: inUnit(over) });
+  // What a figure shows, once it is wanted: see figure.js.
+  drawn.current = () => {
+    const canvases = images.current.querySelectorAll("canvas.plane");
+    const panels = tiles.map((tile, k) => ({ title: tile.title, look: lookOf(tile), size: [canvases[k].clientWidth, canvases[k].clientHeight] }));
+    return { panels, bars, words: viewInWords(state, bars, main, panels[0].look) };
+  };
   return html`<div class="viewer-body">
     <div class="viewer-images">
-      <div class="tiles" data-count=${tiles.length}>
-        ${tiles.map((tile) => html`<${Tile} key=${tile.key} tile=${tile} words=${quantity.words} look=${lookOf(tile)} actions=${actions} />`)}
+      <div class="tiles" data-count=${tiles.length} ref=${images}>
+        ${tiles.map((tile) => html`<${Tile} key=${tile.key} tile=${tile} words=${over ? `${quantity.words} with ${over.words} above` : quantity.words} look=${lookOf(tile)} actions=${actions} />`)}
       </div>
       ${state.mode === "swipe" && panes.length > 1 && html`<${Swipe} panes=${panes} other=${state.other} swipe=${state.swipe} change=${change} />`}
       <${Slices} main=${main} axes=${axes} axis=${main.axes.length > 1 && !state.planes ? state.axis : null} cursor=${cursor}
         onMove=${moveSlice} onAxis=${(axis) => change({ axis })} />
       <${Readout} quantity=${quantity} fields=${fields} panes=${panes} cursor=${cursor} tile=${pointed ?? tiles[0]} place=${readAt} other=${pointed?.other && hover.other}
-        spoken=${spoken} apart=${panes.length > 1 && !comparing} />
-      <${ColourBar} low=${low} high=${high} map=${map} words=${words} />
+        spoken=${spoken} apart=${panes.length > 1 && !comparing} over=${over} />
+      <div class="colour-bars">${bars.map((bar) => html`<${ColourBar} ...${bar} />`)}</div>
     </div>
     <div class="viewer-side">
       <${Tools} tool=${state.tool} change=${change} />
-      <${Window} low=${low} high=${high} map=${map} fade=${state.fade} planes=${state.planes} fades=${fades(panes, read.quantity)}
-        sliced=${panes.length === 1 && main.axes.length > 1} setWindow=${setWindow} change=${change} />
+      <${Colours} title="Window" low=${low} high=${high} map=${map} onWindow=${setWindow} onMap=${(name) => change({ map: name })}>
+        <${Drawing} state=${state} fades=${fades(panes, read.quantity)} sliced=${panes.length === 1 && main.axes.length > 1} change=${change} />
+      </${Colours}>
+      ${over && html`<${Colours} title=${`Overlay: ${over.words}`} before="Overlay " low=${overLow} high=${overHigh} map=${overMap} onWindow=${windowSetter("overWindow")}
+        onMap=${(name) => change({ overMap: name })}>
+        <${Switch} name="clear" state=${state} change=${change}>Clear below the window</${Switch}>
+      </${Colours}>`}
       <${Measures} curves=${curves} state=${state} quantity=${quantity} beside=${truth ? [{ title: QUANTITIES.truth.title, plane: truth }] : []}
         deviations=${deviations} detail=${panes[0].detail} change=${change} main=${main} />
       <${Keys} />
@@ -187,11 +231,13 @@ function Body({ read, panes, state, change }) {
 }
 
 // panes: [{ title, values, stored, detail }], with Values, the names of the stored quantities, and the resolution width, mm, if it is known. state: of the view, which is changed in place;
-// keep(query): called when the view changes.
-export function Viewer({ panes, state, keep, ...more }) {
+// keep(query): called when the view changes; drawn: { current }, which becomes a function that gives what figureOf draws.
+export function Viewer({ panes, state, keep, drawn, ...more }) {
   // The quantities that all panes have.
   const names = shownOf(panes[0].stored.filter((name) => panes.every(({ stored }) => stored.includes(name))));
   if (!names.includes(state.quantity)) [state.quantity] = names;
+  const others = panes.length > 1 ? [] : names.filter((name) => name !== state.quantity);
+  if (!others.includes(state.over)) Object.assign(state, { over: null, overMap: null, overWindow: null, clear: false });
   state.other = Math.max(1, Math.min(state.other, panes.length - 1));
   const [, redraw] = useReducer((count) => count + 1, 0);
   const later = useLater();
@@ -209,9 +255,10 @@ export function Viewer({ panes, state, keep, ...more }) {
         onChoose=${(name) => change({ quantity: name, window: null, map: null })} />
       ${panes.length > 1 && html`<${ChoiceBar} label="Comparison" className="comparison-modes" entries=${Object.entries(MODES)} chosen=${state.mode}
         onChoose=${(mode) => change({ mode, window: null, map: null })} />`}
+      ${others.length > 0 && html`<${Overlay} entries=${others.map((name) => [name, QUANTITIES[name].title])} state=${state} change=${change} />`}
     </div>
     <${Alert} error=${error} />
     <p class="loading" role="status" hidden=${!words}>${words}</p>
-    ${read && html`<${Body} read=${read} panes=${panes} state=${state} change=${change} />`}
+    ${read && html`<${Body} read=${read} panes=${panes} state=${state} change=${change} drawn=${drawn} />`}
   </section>`;
 }
