@@ -17,10 +17,10 @@ SOURCES = (".py", ".cl", ".js", ".css", ".html")
 # to which the ceilings are lowered as code is removed.
 LINES = {
     # folders: (ceiling, goal)
-    # 306 more on 28 November, and 84 of tests: overlays of two quantities, interpolation, and figures for papers in the page.
+    # 306 more on 28 November, and 85 of tests: overlays, interpolation and figures for papers in the page.
     ("kernels", "workers", "service"): (92_049, 87_000),
     ("service",): (31_946, 31_000),
-    ("tests",): (66_324, 58_000),
+    ("tests",): (66_325, 58_000),
     # 70 more on 28 November: triangulations are intersected by Embree too, the better peer.
     ("benchmarks",): (15_340, 13_000),
 }
