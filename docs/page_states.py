@@ -1,7 +1,8 @@
 """Pictures of the states of the web page: `.venv/bin/python docs/page_states.py FOLDER [NAME …]`, minutes.
 
-Each in light and dark colours, on a laptop and on a telephone, to be looked at after changes of the page.
-They are not part of the documentation, whose pictures are made by `pictures.py`.
+Each in light and dark colours, on a laptop and on a telephone, to be looked at after changes of the page;
+`story` is one scan in eight steps, from a dropped file to an export. They are not part of the documentation,
+whose pictures are made by `pictures.py`.
 """
 
 import io
@@ -9,6 +10,7 @@ import sys
 import tempfile
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -133,6 +135,39 @@ def states(service: _Service) -> dict[str, State]:
     }
 
 
+def story(page: Any, service: _Service, folder: Path) -> None:
+    """From a dropped file over Fast and Best to measures and an export, each step in every look."""
+    sample = service.client.wait(service.client.simulate(SAMPLE).id).dataset
+    file = service.folder / "patient-17-left.h5"
+    file.write_bytes(httpx.get(f"{service.url}/v1/datasets/{sample}/file").raise_for_status().content)
+    page.goto("about:blank")
+    page.goto(f"{service.url}/#/")
+    page.locator("#scans .thumbnail").wait_for()
+    looks(page, folder, "story-1-drop")
+    page.set_input_files("#scan-file", file)
+    page.get_by_text("Receiving element 0").wait_for()
+    page.locator(".verdict").wait_for()
+    looks(page, folder, "story-2-scan")
+    page.locator("#start").click()
+    page.locator(".job .state.succeeded").wait_for()
+    page.locator(".job h2 a").click()
+    page.locator(".readout").get_by_text("node ").wait_for()
+    looks(page, folder, "story-3-fast")
+    page.get_by_role("button", name="Go on to Best").click()
+    page.get_by_text("Full waveform, ").wait_for()
+    looks(page, folder, "story-4-best")
+    page.locator(".screen canvas.plane").wait_for(timeout=10 * PATIENCE_MS)
+    looks(page, folder, "story-5-result")
+    page.goto(page.url.partition("?")[0] + "?" + MARKS)
+    page.locator(".readout").get_by_text("node ").wait_for()
+    looks(page, folder, "story-6-measure")
+    page.get_by_text("Export", exact=True).click()
+    looks(page, folder, "story-7-export")
+    page.goto(f"{service.url}/#/jobs")
+    page.locator(".job-table .thumbnail").first.wait_for()
+    looks(page, folder, "story-8-jobs")
+
+
 def main(folder: Path, names: list[str]) -> None:
     """Write the pictures of the named states, or of all."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -140,7 +175,10 @@ def main(folder: Path, names: list[str]) -> None:
         page.set_default_timeout(PATIENCE_MS)
         # Before there is anything.
         photograph(page, service, {"start": ("/", "No scan yet", stay)}, names, folder)
-        photograph(page, service, states(service), names, folder)
+        if not names or "story" in names:
+            story(page, service, folder)
+        if set(names) != {"story"}:
+            photograph(page, service, states(service), names, folder)
 
 
 def photograph(page: Any, service: _Service, shown: dict[str, State], names: list[str], folder: Path) -> None:
@@ -148,18 +186,26 @@ def photograph(page: Any, service: _Service, shown: dict[str, State], names: lis
     for name, (address, text, act) in shown.items():
         if names and name not in names:
             continue
-        for scheme in SCHEMES:
-            page.emulate_media(color_scheme=scheme)
-            for size, (width, height) in SIZES.items():
-                page.set_viewport_size({"width": width, "height": height})
-                # A page of its own for each.
-                page.goto("about:blank")
-                page.goto(f"{service.url}/#{address}")
-                page.locator("main").get_by_text(text).first.wait_for()
-                act(page)
-                page.wait_for_timeout(700)
-                page.screenshot(path=folder / f"{name}-{scheme}-{size}.png", full_page=True)
-                page.context.set_offline(False)
+
+        def reach(address: str = address, text: str = text, act: Callable[[Any], None] = act) -> None:
+            # A page of its own for each.
+            page.goto("about:blank")
+            page.goto(f"{service.url}/#{address}")
+            page.locator("main").get_by_text(text).first.wait_for()
+            act(page)
+
+        looks(page, folder, name, reach)
+        page.context.set_offline(False)
+
+
+def looks(page: Any, folder: Path, name: str, reach: Callable[[], None] = lambda: None) -> None:
+    """Pictures of a state in every look, which is reached before each."""
+    for scheme, (size, (width, height)) in product(SCHEMES, SIZES.items()):
+        page.emulate_media(color_scheme=scheme)
+        page.set_viewport_size({"width": width, "height": height})
+        reach()
+        page.wait_for_timeout(700)
+        page.screenshot(path=folder / f"{name}-{scheme}-{size}.png", full_page=True)
 
 
 if __name__ == "__main__":

@@ -18,9 +18,11 @@ SOURCES = (".py", ".cl", ".js", ".css", ".html")
 LINES = {
     # folders: (ceiling, goal)
     # 306 more on 28 November, and 85 of tests: overlays, interpolation and figures for papers in the page.
-    ("kernels", "workers", "service"): (92_049, 87_000),
-    ("service",): (31_946, 31_000),
-    ("tests",): (66_325, 58_000),
+    # And 180 more in the service, 30 in the workers, 96 in tests: names changed in place, thumbnails,
+    # and waits that say for what.
+    ("kernels", "workers", "service"): (92_280, 87_000),
+    ("service",): (32_128, 31_000),
+    ("tests",): (66_421, 58_000),
     # 70 more on 28 November: triangulations are intersected by Embree too, the better peer.
     ("benchmarks",): (15_340, 13_000),
 }

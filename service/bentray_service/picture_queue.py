@@ -2,12 +2,13 @@
 
 import asyncio
 import math
-import time
-from collections import Counter
+from collections import deque
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from itertools import count
+from statistics import median
+from time import monotonic
 
 from bentray_workers.cluster.capacities import WorkerCapacity
 
@@ -22,6 +23,8 @@ MAX_PER_ACCOUNT, MAX_IN_TOTAL = 64, 256
 LONG_S = 3.0
 # Maximum age of the list of workers, s.
 FRESH_S = 1.0
+# The speed of a kind of image is that of its last ones that took longer than this, s: people wait for these.
+WAITED_S, LAST = 0.5, 10
 
 
 @dataclass
@@ -31,6 +34,26 @@ class _Waiter:
     fits: Callable[[WorkerCapacity], bool]
     long: bool
     place: asyncio.Future[str]
+
+
+@dataclass(eq=False)
+class Picture:
+    """An image in progress.
+
+    Attributes:
+        kind: images of one kind take times in proportion to their estimated CPU time.
+        seconds: this estimate, s.
+        begun: when a worker got its first task, s of the monotonic clock; None before.
+    """
+
+    kind: str
+    seconds: float
+    begun: float | None = None
+
+    @property
+    def taken(self) -> float:
+        """Time since then, s."""
+        return 0.0 if self.begun is None else monotonic() - self.begun
 
 
 class PictureQueue:
@@ -49,16 +72,17 @@ class PictureQueue:
         self._asked = -math.inf
         self._busy: dict[str, bool] = {}
         self._waiting: dict[Account, list[_Waiter]] = {}
-        # By account with images in progress: CPU time, number of images, last turn.
-        self._seconds: dict[Account, float] = {}
-        self._pictures: Counter[Account] = Counter()
+        # By account with images in progress: these, and its last turn.
+        self._pictures: dict[Account, list[Picture]] = {}
         self._served: dict[Account, int] = {}
+        # By kind: measured over estimated time.
+        self._speeds: dict[str, deque[float]] = {}
         self._turns = count(1)
         self._refreshing: asyncio.Task[None] | None = None
 
     async def workers(self) -> Mapping[str, WorkerCapacity]:
         """The connected workers by address, at most ``FRESH_S`` old."""
-        if time.monotonic() - self._asked > FRESH_S:
+        if monotonic() - self._asked > FRESH_S:
             await self._refresh()
         return self._workers
 
@@ -67,22 +91,23 @@ class PictureQueue:
         return self._workers.get(address, WorkerCapacity(0, ()))
 
     @asynccontextmanager
-    async def admitted(self, account: Account, seconds: float) -> AsyncIterator[None]:
+    async def admitted(self, account: Account, seconds: float, kind: str = "") -> AsyncIterator[Picture]:
         """Admit an image with an estimated CPU time, for the duration of the block.
 
         Raises:
             RateLimited: when there are too many images in progress, or it would take too long.
         """
         self._check(account, seconds)
-        self._pictures[account] += 1
-        self._seconds[account] = self._seconds.get(account, 0.0) + seconds
+        picture = Picture(kind, seconds)
+        self._pictures.setdefault(account, []).append(picture)
         try:
-            yield
+            yield picture
+            if picture.taken > WAITED_S:
+                self._speeds.setdefault(kind, deque(maxlen=LAST)).append(picture.taken / seconds)
         finally:
-            self._pictures[account] -= 1
-            self._seconds[account] -= seconds
+            self._pictures[account].remove(picture)
             if not self._pictures[account]:
-                del self._pictures[account], self._seconds[account]
+                del self._pictures[account]
                 self._served.pop(account, None)
 
     @asynccontextmanager
@@ -118,6 +143,27 @@ class PictureQueue:
         """Number of waiting tasks by account."""
         return {account: len(waiters) for account, waiters in self._waiting.items()}
 
+    @property
+    def busy(self) -> int:
+        """Number of workers with a rendering task."""
+        return len(self._busy)
+
+    def left_s(self, account: Account) -> float | None:
+        """Estimated time until the images of an account in progress are ready, s.
+
+        None while the speed of one of their kinds is not measured, and once this time has passed.
+        """
+        if any(picture.kind not in self._speeds for each in self._pictures.values() for picture in each):
+            return None
+        left = {
+            other: [max(0.0, median(self._speeds[one.kind]) * one.seconds - one.taken) for one in pictures]
+            for other, pictures in self._pictures.items()
+        }
+        own = left.pop(account, [])
+        # Accounts take turns.
+        whole = sum(own) + sum(min(sum(each), sum(own)) for each in left.values())
+        return max(*own, whole / max(1, len(self._workers)), 0.0) or None
+
     async def close(self) -> None:
         """Stop polling for workers."""
         if self._refreshing is not None:
@@ -126,11 +172,12 @@ class PictureQueue:
                 await self._refreshing
 
     def _check(self, account: Account, seconds: float) -> None:
-        own = self._seconds.get(account, 0.0) + seconds
+        all_seconds = {other: sum(one.seconds for one in each) for other, each in self._pictures.items()}
+        own = all_seconds.pop(account, 0.0) + seconds
         # Accounts take turns, so each of them delays this one by at most its own time.
-        others = sum(min(each, own) for other, each in self._seconds.items() if other != account)
+        others = sum(min(each, own) for each in all_seconds.values())
         late = (own + others) / max(1, len(self._workers)) - LATEST_S
-        held, all_of_them = self._pictures[account], self._pictures.total()
+        held, all_of_them = len(self._pictures.get(account, ())), sum(map(len, self._pictures.values()))
         if all_of_them and late > 0.0:
             given = f"{held} images of this tenant in progress, {all_of_them} in total"
             accepted = f"images that can be rendered in about {LATEST_S:g} s; see Retry-After"
@@ -180,7 +227,7 @@ class PictureQueue:
 
     async def _refresh(self) -> None:
         self._workers = await self._ask_workers()
-        self._asked = time.monotonic()
+        self._asked = monotonic()
         self._assign()
 
     async def _refresh_while_waiting(self) -> None:

@@ -11,7 +11,7 @@ from concurrent.futures import CancelledError, ThreadPoolExecutor
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, TypeVar
 
 from distributed import KilledWorker
 
@@ -27,7 +27,7 @@ from bentray_workers.images import drawing_tasks
 from bentray_workers.images.result_summary import result_summary
 from bentray_workers.images.truth_export import export_truth
 from bentray_workers.reconstruction.quality_report import quality_page, quality_report
-from bentray_workers.reconstruction.scan_views import emission_traces, scan_geometry
+from bentray_workers.reconstruction.scan_views import emission_traces, scan_geometry, scan_thumbnail
 from bentray_workers.rendering import field_picture, picture_cost, refraction
 from bentray_workers.rendering.coefficients import coefficients_npy
 from bentray_workers.rendering.field_view import FieldView
@@ -40,7 +40,7 @@ from bentray_workers.rendering.tiles import PictureTasks
 from . import __version__
 from .errors import Busy, StorageFull
 from .files.data_folder import Files
-from .picture_queue import LONG_S, PictureQueue
+from .picture_queue import LONG_S, Picture, PictureQueue
 from .rows.accounts import Account, Accounts
 from .rows.ids import Tenant
 from .rows.tables import DatasetRow, FieldRow, MeshRow, VolumeRow
@@ -132,7 +132,7 @@ class Pictures:
     async def refraction_png(self, volume: VolumeRow, view: RefractionView) -> bytes:
         """Render a volume with refraction."""
         cost = picture_cost.refraction_cost(VolumeFile.from_row(volume.values()), view)
-        return bytes(await self._made(volume, cost, lambda here: refraction.tasks_of(here, view)))
+        return bytes(await self._made(volume, cost, view.mode, lambda here: refraction.tasks_of(here, view)))
 
     async def coefficients(self, volume: VolumeRow, view: RefractionView) -> bytes:
         """Filter a volume, see ``bentray_workers.rendering.coefficients``."""
@@ -153,7 +153,7 @@ class Pictures:
     async def field_png(self, field: FieldRow, view: FieldView) -> bytes:
         """Render a scene with a geometry field."""
         cost = picture_cost.field_cost(field.figures, view)
-        return bytes(await self._made(field, cost, lambda here: field_picture.tasks_of(here, view)))
+        return bytes(await self._made(field, cost, "field", lambda here: field_picture.tasks_of(here, view)))
 
     async def field_map_png(self, field: FieldRow, which: str) -> bytes:
         """Render the geometry image of a field, see ``bentray_workers.rendering.field_picture.map_png``."""
@@ -162,26 +162,35 @@ class Pictures:
 
     async def quality(self, dataset: DatasetRow, picker: str) -> dict[str, Any]:
         """The quality report of a dataset, see ``bentray_workers.reconstruction.quality_report``."""
-        return dict(json.loads(await self._report(dataset, picker, "json")))
+        return dict(json.loads(await self._examined(dataset, picker, "json", quality_report)))
 
     async def quality_png(self, dataset: DatasetRow, picker: str) -> bytes:
         """The quality report of a dataset as an image."""
-        return await self._report(dataset, picker, "png")
+        return await self._examined(dataset, picker, "png", quality_page)
 
-    async def _report(self, dataset: DatasetRow, picker: str, form: Literal["json", "png"]) -> bytes:
-        """A kept report, or a new one, which all who request it share and which outlives their requests."""
+    async def _examined(self, dataset: DatasetRow, picker: str, form: str, task: Callable[..., Any]) -> bytes:
+        cost, how = picture_cost.quality_cost(dataset.values()), {"picker": picker, **_water(dataset)}
+        return await self._kept(dataset, f"{picker}.{form}", cost, task, how)
+
+    async def thumbnail(self, dataset: DatasetRow) -> bytes:
+        """A small picture of a dataset, see ``scan_thumbnail``."""
+        cost = picture_cost.emission_cost(dataset.values())
+        return await self._kept(dataset, "thumbnail.png", cost, scan_thumbnail, {})
+
+    async def _kept(
+        self, dataset: DatasetRow, name: str, cost: Cost, task: Callable[..., Any], how: dict[str, Any]
+    ) -> bytes:
+        """What is kept of a dataset, or a new one, which all who request it share and which outlives them."""
         stated = repr((__version__, dataset.water_temperature_c))
-        name = f"{hashlib.sha256(stated.encode()).hexdigest()[:16]}-{picker}.{form}"
+        name = f"{hashlib.sha256(stated.encode()).hexdigest()[:16]}-{name}"
         path = self._files.of(dataset.tenant).report(dataset.id, name)
         with suppress(FileNotFoundError):
             return await self._in_thread(path.read_bytes)
 
         async def keep() -> bytes:
-            task: Callable[..., Any] = quality_page if form == "png" else quality_report
             try:
-                cost, how = picture_cost.quality_cost(dataset.values()), {"picker": picker, **_water(dataset)}
                 made = await self._one(dataset, cost, task, how)
-                content = bytes(made) if form == "png" else json.dumps(made).encode()
+                content = made if isinstance(made, bytes) else json.dumps(made).encode()
                 with suppress(OSError):
                     await self._in_thread(lambda: write_bytes(path, content))
                 return content
@@ -228,9 +237,14 @@ class Pictures:
         cost = picture_cost.truth_cost(VolumeFile.from_row(volume.values()), scan.values())
         return dict(await self._one(volume, cost, result_summary, {"scan": await self._fetched(scan)}))
 
-    def waiting(self, tenant: Tenant) -> int:
-        """Number of waiting tasks of the account of a tenant."""
-        return self._queue.waiting().get(self._accounts.of(tenant), 0)
+    def load(self, tenant: Tenant) -> dict[str, Any]:
+        """Waiting images of the account of a tenant, workers that draw, and the time left, s, if known."""
+        account = self._accounts.of(tenant)
+        return {
+            "waiting_images": self._queue.waiting().get(account, 0),
+            "drawing_workers": self._queue.busy,
+            "images_s": self._queue.left_s(account),
+        }
 
     async def close(self) -> None:
         """Stop polling for workers and examining, in the event loop that uses this object."""
@@ -254,12 +268,14 @@ class Pictures:
         how: dict[str, Any],
         refused: tuple[str, str] | None = None,
     ) -> Any:
-        return await self._made(item, cost, lambda here: PictureTasks([(task, here)], None), how, refused)
+        tasks_of = lambda here: PictureTasks([(task, here)], None)  # noqa: E731 - as short as a call of it
+        return await self._made(item, cost, task.__name__, tasks_of, how, refused)
 
     async def _made(
         self,
         item: Input,
         cost: Cost,
+        kind: str,
         tasks_of: Callable[[Path], PictureTasks],
         how: Mapping[str, Any] | None = None,
         refused: tuple[str, str] | None = None,
@@ -269,6 +285,7 @@ class Pictures:
         Args:
             item: input, fetched from the store first.
             cost: of the tasks.
+            kind: images of one kind take times in proportion to their costs.
             tasks_of: creates the tasks for the path of the input.
             how: further arguments of each task.
             refused: field and value of a refusal; None: those of the item.
@@ -277,10 +294,13 @@ class Pictures:
         workers = await self._queue.workers()
         picture_cost.check_memory(*(refused or _named(item)), cost, list(workers.values()))
         try:
-            async with self._queue.admitted(account, cost.seconds), asyncio.timeout(RENDER_SECONDS):
+            async with (
+                self._queue.admitted(account, cost.seconds, kind) as picture,
+                asyncio.timeout(RENDER_SECONDS),
+            ):
                 tasks = tasks_of(await self._fetched(item))
                 try:
-                    return await _Run(self, account, cost, dict(how or {})).all(tasks)
+                    return await _Run(self, account, cost, picture, dict(how or {})).all(tasks)
                 except (InvalidInput, FileNotFoundError):
                     # Report an input that was deleted or damaged in the meantime.
                     await self._fetched(item)
@@ -326,8 +346,11 @@ def _water(dataset: DatasetRow) -> dict[str, float]:
 class _Run:
     """The tasks of one image."""
 
-    def __init__(self, pictures: Pictures, account: Account, cost: Cost, how: dict[str, Any]) -> None:
+    def __init__(
+        self, pictures: Pictures, account: Account, cost: Cost, picture: Picture, how: dict[str, Any]
+    ) -> None:
         self._pictures, self._account, self._cost, self._how = pictures, account, cost, how
+        self._picture = picture
         self._long = cost.seconds > LONG_S
         self._begun: list[Any] = []
 
@@ -354,6 +377,7 @@ class _Run:
         for _ in range(MAX_TRIES):
             async with self._pictures._queue.place(self._account, self._fits, long=self._long) as address:
                 begun = time.monotonic()
+                self._picture.begun = self._picture.begun or begun
                 future = await self._pictures._in_thread(partial(self._submit, address, task))
                 self._begun.append(future)
                 if not await self._leaves(future, address):

@@ -187,3 +187,37 @@ def test_the_number_of_pictures_is_bounded():
             """They were given back."""
 
     asyncio.run(go())
+
+
+def test_the_time_left_comes_from_measured_times_of_the_same_kind(monkeypatch):
+    clock = [100.0]
+    monkeypatch.setattr(picture_queue, "monotonic", lambda: clock[0])
+
+    async def go():
+        queue = Run(0, 0).queue
+        await queue.workers()
+
+        async def drawn(kind, seconds, took):
+            async with queue.admitted(A, seconds, kind) as picture:
+                picture.begun = clock[0]
+                clock[0] += took
+
+        # Too quick for anyone to wait.
+        await drawn("glass", 2.0, 0.1)
+        async with queue.admitted(A, 4.0, "glass"):
+            assert queue.left_s(A) is None
+        await drawn("glass", 2.0, 3.0)
+        assert queue.left_s(A) is None
+        async with queue.admitted(A, 4.0, "glass") as picture, queue.admitted(B, 40.0, "glass"):
+            # It waits for its own 6 s and as many of the other account, on two workers.
+            assert queue.left_s(A) == pytest.approx(6.0)
+            picture.begun = clock[0]
+            clock[0] += 2.0
+            assert queue.left_s(A) == pytest.approx(4.0)
+            assert queue.left_s(B) == pytest.approx(60.0)
+            async with queue.admitted(C, 1.0, "clay"):
+                assert queue.left_s(A) is None
+        clock[0] += 100.0
+        assert queue.left_s(A) is None
+
+    asyncio.run(go())

@@ -13,6 +13,7 @@ from bentray_kernels.requests.limits import FREQUENCY_HZ, SPEED_MPS, TEMPERATURE
 from bentray_kernels.requests.names import DEFAULT_PICKER, PickerName
 from bentray_workers.files.dataset.copy import Correction
 from bentray_workers.foreign_scans.scan_metadata import FIELDS, UNITS
+from bentray_workers.reconstruction.scan_views import THUMBNAIL_PX
 
 from ..ingest.canonical import add_corrected
 from ..rows.ids import new_id
@@ -207,6 +208,15 @@ async def quality_png(dataset_id: str, context: Context, picker: Picker = DEFAUL
     how = {"picker": picker, "what": "quality", "water_temperature_c": dataset.water_temperature_c}
     draw = partial(context.background.pictures.quality_png, dataset, picker)
     return await picture(context, dataset, how, draw)
+
+
+@router.head("/{dataset_id}/thumbnail.png", include_in_schema=False)
+@router.get("/{dataset_id}/thumbnail.png", response_class=Response, responses=PICTURE)
+async def thumbnail_png(dataset_id: str, context: Context) -> Response:
+    """A small picture of a scan: its travel times, or the traces of its first emission."""
+    dataset = await context.dataset(dataset_id)
+    how = {"what": "thumbnail", "size": THUMBNAIL_PX}
+    return await picture(context, dataset, how, partial(context.background.pictures.thumbnail, dataset))
 
 
 @changes_router.patch("/{dataset_id}", dependencies=JSON, responses=problems(400, 404, 413, 415, 422))

@@ -82,6 +82,13 @@ class QueueRecord(BaseModel):
     all_queued: int = Field(description="Queued jobs of all tenants.")
     all_running: int = Field(description="Running jobs of all tenants.")
     waiting_images: int = Field(description="Images of the tenant that wait for a worker.")
+    drawing_workers: int = Field(
+        description="Workers that draw images, or compute what a page shows, of all tenants."
+    )
+    images_s: float | None = Field(
+        description="Estimated time until all such images of the tenant are ready, s, from measured times of "
+        "earlier ones; null without these, and where none is in progress."
+    )
 
 
 class ClusterRecord(BaseModel):
@@ -105,6 +112,6 @@ async def show_cluster(context: Context) -> ClusterRecord:
             running=running,
             all_queued=all_queued,
             all_running=all_running,
-            waiting_images=context.background.pictures.waiting(context.tenant),
+            **context.background.pictures.load(context.tenant),
         ),
     )

@@ -68,9 +68,8 @@ async def picture(
 def _share(how: Mapping[str, Any]) -> float:
     """Weight of a picture in the rate limit; a viewer that turns an object requests many small ones."""
     times = how.get("rays", how.get("degree", 1) if how.get("supersampling") == "real" else 1)
-    rays: float = (
-        how.get("width", math.inf) * how.get("height", math.inf) * (times / how.get("ray_spacing", 1)) ** 2
-    )
+    side = how.get("size") or math.inf
+    rays: float = how.get("width", side) * how.get("height", side) * (times / how.get("ray_spacing", 1)) ** 2
     return min(1.0, max(LEAST_SHARE, rays / WHOLE_RAYS))
 
 

@@ -44,7 +44,7 @@ def record_of(model: type[Record], row: Base, **given: Any) -> Record:
 
 def dataset_record(row: DatasetRow) -> DatasetRecord:
     here, job = f"/v1/datasets/{row.id}", row.job_id
-    links = {"self": here, "file": f"{here}/file"}
+    links = {"self": here, "file": f"{here}/file", "thumbnail": f"{here}/thumbnail.png"}
     if job is not None:
         links["job"] = f"/v1/jobs/{job}"
     return record_of(DatasetRecord, row, title=row.name or row.title, job=job, links=links)

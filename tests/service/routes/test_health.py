@@ -69,7 +69,13 @@ def test_the_queue_of_others_is_a_number(http, work, uploaded, submitted, until)
     mine = http.get("/v1/cluster").json()["queue"]
     theirs = http.get("/v1/cluster", headers=other)
     work.hold.set()
-    whole = {"all_queued": queued, "all_running": running, "waiting_images": 0}
+    whole = {
+        "all_queued": queued,
+        "all_running": running,
+        "waiting_images": 0,
+        "drawing_workers": 0,
+        "images_s": None,
+    }
     assert mine == {"queued": queued, "running": running, **whole}
     assert theirs.json()["queue"] == {"queued": 0, "running": 0, **whole}
     assert not [name for name in (*jobs, sent, "acme") if name in theirs.text]

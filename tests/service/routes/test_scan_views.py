@@ -79,6 +79,15 @@ def test_names_the_wrong_parameter_and_what_is_accepted(http, traced, uploaded):
     assert "no traces" in refused(without, "quantity")["found"]
 
 
+def test_a_thumbnail_is_drawn_once_and_kept(http, cluster, uploaded):
+    here = http.get(f"/v1/datasets/{uploaded(http)}").json()["links"]["thumbnail"]
+    first = http.get(here)
+    assert (first.headers["content-type"], first.content[:4]) == ("image/png", b"\x89PNG")
+    count = len(cluster.submitted)
+    assert http.get(here).content == first.content
+    assert len(cluster.submitted) == count
+
+
 @pytest.fixture
 def faulty(tmp_path, http):
     """The address of a scan whose element 5 does not receive."""

@@ -504,10 +504,9 @@ def test_the_copied_code_reads_the_values(page, result):
 def test_a_result_is_renamed_exported_and_deleted(page, made):
     own_result = made(SPEED, **MORE)
     ready(page, own_result)
-    page.get_by_text("More", exact=True).click()
-    page.get_by_role("button", name="Rename").click()
-    page.get_by_label("Name", exact=True).fill("With the new water speed")
-    page.locator("#rename").get_by_role("button", name="Rename").click()
+    page.get_by_role("heading", level=1).dblclick()
+    page.keyboard.type("With the new water speed")
+    page.keyboard.press("Enter")
     expect(page.get_by_role("heading", level=1)).to_have_text("With the new water speed")
     page.get_by_role("navigation").get_by_role("link", name="Jobs").click()
     page.get_by_role("main").get_by_role("link", name="With the new water speed").click()

@@ -91,6 +91,26 @@ def test_a_sample_scan_is_simulated_and_opened(page, address, monkeypatch):
     assert request == PhantomScan(**SAMPLE).chosen()
 
 
+def renamed_in_place(page, row, name, route):
+    """Rename what a row of a list shows to "Another name", after a change of mind and a lost connection."""
+    expect(row.locator(".thumbnail")).to_have_js_property("naturalWidth", 96)
+    pencil, field = row.get_by_role("button", name=f"Rename {name}"), row.get_by_label(f"New name of {name}")
+    pencil.click()
+    page.keyboard.type("Not this")
+    page.keyboard.press("Escape")
+    expect(pencil).to_be_focused()
+    page.keyboard.press("Enter")
+    expect(field).to_have_value(name)
+    page.keyboard.type("Another name")
+    page.route(route, lambda sent: sent.abort() if sent.request.method == "PATCH" else sent.continue_())
+    page.keyboard.press("Enter")
+    row.get_by_text("The service does not answer.").wait_for()
+    page.unroute(route)
+    expect(field).to_have_value("Another name")
+    page.keyboard.press("Enter")
+    expect(row.get_by_role("link", name="Another name")).to_be_visible()
+
+
 @pytest.fixture
 def in_pieces(page):
     """Let the page send pieces of 4096 bytes, as if the file were large."""
@@ -125,7 +145,8 @@ def test_an_upload_goes_on_after_a_broken_connection_and_is_listed(page, address
     page.set_input_files("#scan-file", file)
     page.get_by_role("heading", name="Sixteen elements").wait_for()
     page.get_by_role("link", name="Scans", exact=True).click()
-    page.get_by_role("link", name="Sixteen elements").first.click()
+    renamed_in_place(page, page.locator("#scans li").first, "Sixteen elements", "**/v1/datasets/*")
+    page.get_by_role("link", name="Another name").first.click()
     page.get_by_text("16 emitters").wait_for()
     assert file.stat().st_size > 3 * 4096
     assert sent[:3] == [0, 4096, 4096]

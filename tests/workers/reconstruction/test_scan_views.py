@@ -1,16 +1,23 @@
 """The views of a scan: geometry, traces and picks are those of the dataset; a reduction keeps peaks."""
 
 import base64
+import io
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from bentray_kernels.acquisition import Waveform, pick
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.dataset import write_dataset
 from bentray_workers.reconstruction import scan_views
-from bentray_workers.reconstruction.scan_views import emission_traces, scan_geometry
+from bentray_workers.reconstruction.scan_views import (
+    THUMBNAIL_PX,
+    emission_traces,
+    scan_geometry,
+    scan_thumbnail,
+)
 
 from ...kernels.acquisition.traces import FREQUENCY_HZ, RATE_HZ, START_S, WATER_MPS, blob_delay, scan
 
@@ -133,3 +140,21 @@ def test_silent_traces_have_no_frequency_and_no_picks(tmp_path):
     view = emission_traces(path, emission=0, index=0, what="object")
     assert not decoded(view).any()
     assert view["pick_s"] is None
+
+
+def test_a_thumbnail_shows_travel_times_else_traces(tmp_path):
+    def drawn(made):
+        picture = Image.open(io.BytesIO(scan_thumbnail(stored(tmp_path, made))))
+        assert picture.size == (THUMBNAIL_PX, THUMBNAIL_PX)
+        return np.asarray(picture)[..., 0].astype(float)
+
+    made = scan(blob_delay(12), elements=12)
+    times = np.linspace(0.0, 1e-6, 144).reshape(12, 12)
+    times[3, 5] = np.nan
+    picked = drawn(replace(made, waveform=None, delta_tof_s=times))
+    assert picked[0, 9] < 10 < 245 < picked[-1, -10]
+    # The pair without a time, and an element with itself.
+    assert picked[26, 43] == picked[0, 0] == scan_views.MISSING != picked[26, 52]
+    # The arrival at each receiver is later, the farther it is from the emitter.
+    first = (drawn(made) > 80.0).argmax(axis=0)
+    assert first[48] > first[24] > first[8]

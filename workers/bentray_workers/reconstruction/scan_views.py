@@ -1,4 +1,4 @@
-"""Views of a stored scan for a person: its geometry, and the traces of one emission with their picks."""
+"""Views of a stored scan for a person: geometry, traces of one emission with their picks, and a thumbnail."""
 
 import base64
 import math
@@ -17,9 +17,12 @@ from bentray_kernels.requests.names import DEFAULT_PICKER
 
 from ..files.dataset.scan import measured_frequency, open_slice, read_header
 from ..files.dataset.units import propose
+from ..images.png import png_of
 
 # Elements of a drawing, and receivers and samples of the traces of a view; of more, every n-th is taken.
 MAX_ELEMENTS, MAX_RECEIVERS, MAX_SAMPLES = 4096, 512, 1024
+# Sides of a thumbnail, pixels, and the grey of pairs without a travel time.
+THUMBNAIL_PX, MISSING = 96, 230.0
 
 
 def scan_geometry(path: Path, *, water_temperature_c: float | None = None) -> dict[str, Any]:
@@ -126,6 +129,32 @@ def emission_traces(
         "pick_s": None if picks is None else _numbers((straight + picks)[receivers]),
         "picker": picker,
     }
+
+
+def scan_thumbnail(path: Path) -> bytes:
+    """Task: a small grey picture of the first slice of a scan, as PNG.
+
+    Travel-time differences, emitters down and receivers across; without these the magnitude of the
+    traces of the first emission, time down and receivers across.
+
+    Args:
+        path: of the dataset file.
+
+    Raises:
+        InvalidInput: as ``read_dataset``.
+    """
+    scan = read_header(path, plausible=False, estimate=False).dataset
+    with open_slice(path, scan, 0) as dataset:
+        if dataset.waveform is None or dataset.picked:
+            image = dataset.differential_tof()
+        else:
+            shot = np.asarray(dataset.waveform.object[0], dtype=np.float32)
+            image = np.abs(_reduced(shot, max(1, shot.shape[1] // THUMBNAIL_PX))).T
+    image = image[np.ix_(*(np.linspace(0, n - 1, THUMBNAIL_PX).round().astype(int) for n in image.shape))]
+    known = np.isfinite(image)
+    low, high = np.percentile(image[known], (1.0, 99.0)) if known.any() else (0.0, 1.0)
+    grey = 255.0 * np.clip((image - low) / ((high - low) or 1.0), 0.0, 1.0)
+    return png_of(np.repeat(np.where(known, grey, MISSING).astype(np.uint8)[..., None], 3, axis=2))
 
 
 def _picks(dataset: Dataset, emission: int) -> tuple[Floats | None, str]:

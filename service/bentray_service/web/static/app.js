@@ -3,6 +3,7 @@ import { parse } from "./parts/address.js";
 import { lost, request } from "./parts/api.js";
 import { admitted, at } from "./parts/key.js";
 import { Alert, html, render } from "./parts/view.js";
+import { Waiting } from "./parts/waiting.js";
 import { counted } from "./parts/words.js";
 
 // A page is pages/NAME.js with open({ id, query }), which returns its view, or a promise of it.
@@ -36,7 +37,7 @@ async function openPage(first) {
   const found = PAGES.find(([pattern]) => pattern.test(path));
   document.title = "Bentray";
   markMenu(found?.[2]);
-  show(html`<p class="loading" key=${mine}>Opening the page</p>`);
+  show(html`<${Waiting} class="loading" key=${mine} words="Opening the page" />`);
   if (!first) at("page").focus({ preventScroll: true });
   scrollTo(0, 0);
   try {

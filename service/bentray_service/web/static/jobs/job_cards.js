@@ -3,33 +3,28 @@ import { glassOf, linkTo, queryOf, shownBy } from "../parts/address.js";
 import { inWords, request } from "../parts/api.js";
 import { FORMATS } from "../parts/export_menu.js";
 import { KeyLink, Picture } from "../parts/key.js";
-import { loadTitles, titleOfJob } from "../parts/lists.js";
+import { loadTitles, Renamable, titleOfJob } from "../parts/lists.js";
 import { Alert, Button, html, useRead, useState } from "../parts/view.js";
+import { Waiting } from "../parts/waiting.js";
 import { duration, inNanoseconds, placeInQueue, settingsOf, tasksInWords } from "../parts/words.js";
 import { useJobs } from "./followed_jobs.js";
 import { residuals, Sparkline } from "./misfit_curve.js";
 
 // An image that links to a larger one.
 function Drawn({ address, words, larger = address }) {
-  const [failed, setFailed] = useState(false);
-  return html`<div class="picture">
-    ${failed
+  const [state, setState] = useState("drawing");
+  return html`<div class=${`picture ${state}`}>
+    ${state === "drawing" && html`<${Waiting} words="Drawing the image" />`}
+    ${state === "failed"
       ? "The image could not be drawn."
-      : html`<${KeyLink} href=${larger}><${Picture} address=${address} alt=${words} onError=${() => setFailed(true)} /></${KeyLink}>`}
+      : html`<${KeyLink} href=${larger}><${Picture} address=${address} alt=${words} onShown=${() => setState("drawn")} onError=${() => setState("failed")} /></${KeyLink}>`}
   </div>`;
-}
-
-// A small picture beside the name of a job in a list: it says nothing to a screen reader, which reads the name.
-export function Thumbnail({ job: { links: { field, image } } }) {
-  const [failed, setFailed] = useState(false);
-  const view = field ? { width: 96, height: 96, rays: 2 } : { frame: false, size: 96 };
-  return image && !failed && html`<${Picture} class="thumbnail" address=${`${image}?${queryOf(view)}`} alt="" onError=${() => setFailed(true)} />`;
 }
 
 // The slice without a frame, whose text would be too small, and its range of colours; a 3-D volume is also rendered.
 function Volume({ job, title }) {
   const [volume] = useRead(() => request(job.links.volume));
-  if (!volume) return html`<div class="picture"></div>`;
+  if (!volume) return html`<div class="picture"><${Waiting} words="Reading the volume" /></div>`;
   const [low, high] = volume.value_range;
   const range = low < high ? { low, high } : {};
   const { refraction } = volume.links;
@@ -94,14 +89,14 @@ function Links({ job: { links }, onCancel }) {
   </div>`;
 }
 
-function JobCard({ job, title, onCancel }) {
+function JobCard({ job, title, onCancel, onRename }) {
   const course = residuals(job.history);
   const { values } = course;
   const unfinished = job.state === "running" || job.state === "cancelling";
   return html`<li class="job" id=${job.id}>
     <div class="pictures"><${Pictures} key=${job.state} job=${job} title=${title} /></div>
     <div>
-      <h2><a href=${`#/jobs/${job.id}`}>${job.title}</a><span class=${`state ${job.state}`}>${job.state}</span></h2>
+      <h2><${Renamable} record=${job} field="name" name=${job.title} onRename=${onRename}><a href=${`#/jobs/${job.id}`}>${job.title}</a></${Renamable}><span class=${`state ${job.state}`}>${job.state}</span></h2>
       <p class="input">${title}</p>
       <p>${settingsOf(job)}</p>
       ${job.ahead !== null && html`<p>${placeInQueue(job.ahead)}</p>`}
@@ -137,7 +132,7 @@ export function JobList({ empty = "", filters = {}, read, onJobs, refresh = {} }
     <${Alert} id="jobs-error" error=${error} />
     <p class="empty" hidden=${!jobs || jobs.length > 0}>${empty}</p>
     <ul class="jobs" id="jobs">
-      ${jobs?.slice(0, MOST).map((job) => html`<${JobCard} key=${job.id} job=${job} onCancel=${() => change(job.links.cancel, "POST")}
+      ${jobs?.slice(0, MOST).map((job) => html`<${JobCard} key=${job.id} job=${job} onRename=${again} onCancel=${() => change(job.links.cancel, "POST")}
         title=${titleOfJob(job) || job.dataset || job.volume || job.mesh} />`)}
     </ul>
     <p class="links" hidden=${!(jobs?.length > MOST)}><a href=${linkTo("/jobs", query)}>All in the table of jobs</a></p>`;

@@ -2,6 +2,7 @@
 import { inWords, request } from "../parts/api.js";
 import { loadTitles, titleOfJob } from "../parts/lists.js";
 import { Alert, Button, html, useNewest, useRead, useRef, useState } from "../parts/view.js";
+import { jobsInWords, Waiting } from "../parts/waiting.js";
 import { duration, placeInQueue, settingsOf } from "../parts/words.js";
 import { useJobs } from "./followed_jobs.js";
 import { Plan } from "./job_cards.js";
@@ -150,6 +151,7 @@ export function LiveJob({ first, before, onSuccess }) {
     <p class="facts live-facts">${jobs && titleOfJob(job)} · ${settingsOf(job)}</p>`}
     <section class="panel" aria-label="State">
       <p class="live-what" role="status">${happening(job)}</p>
+      ${(job.state === "queued" || (running && !job.progress.done)) && html`<${Waiting} words="" busyInWords=${jobsInWords} />`}
       <${Progress} job=${job} estimate=${estimate} elapsed=${elapsedOf(job)} />
       <div class="live-plan">${job.plan && html`<${Plan} plan=${job.plan} />`}</div>
       <${Alert} className="live-error" error=${problem} />

@@ -1,9 +1,8 @@
 // All jobs in a table, newest first, below batches of them; with "batch" in the address those of one batch.
 import { IDLE_MS, isUnfinished, useJobs } from "../jobs/followed_jobs.js";
-import { Thumbnail } from "../jobs/job_cards.js";
 import { keepQuery, pick } from "../parts/address.js";
 import { parametersOf, request } from "../parts/api.js";
-import { Filters, ListPages, loadTitles, olderOf, titleOfJob } from "../parts/lists.js";
+import { Filters, ListPages, loadTitles, olderOf, Renamable, Thumbnail, titleOfJob } from "../parts/lists.js";
 import { Alert, Button, Choice, Field, html, useAct, useNewest, useRead, useRef, useState } from "../parts/view.js";
 import { counted, duration, inTime, inWords, moment } from "../parts/words.js";
 
@@ -76,9 +75,10 @@ function Actions({ job, act }) {
 }
 
 // Roles in full, since a table that is laid out as cards is no table for a screen reader.
-function Row({ job, act }) {
+function Row({ job, act, refresh }) {
   const cells = [
-    html`<${Thumbnail} job=${job} /><a href=${`#/jobs/${job.id}`}>${job.title}</a>`, inWords(job.kind), source(job), html`<${State} job=${job} />`, job.started_by || "–",
+    html`<${Thumbnail} record=${job} />
+      <${Renamable} record=${job} field="name" name=${job.title} onRename=${refresh}><a href=${`#/jobs/${job.id}`}>${job.title}</a></${Renamable}>`, inWords(job.kind), source(job), html`<${State} job=${job} />`, job.started_by || "–",
     html`<time datetime=${job.created} title=${inTime(job.created)}>${moment(job.created)}</time>`,
     job.seconds === null ? "–" : duration(job.seconds), html`<${Actions} job=${job} act=${act} />`,
   ];
@@ -109,7 +109,7 @@ function JobTable({ query: first, words }) {
   const [query, setQuery] = useState(pick(first, ["batch", "text", "state", "kind", "before"]));
   const [older, setOlder] = useState("");
   const newest = useNewest(query);
-  const [jobs, error, , act] = useJobs({
+  const [jobs, error, refresh, act] = useJobs({
     key: query.toString(),
     async read() {
       const { jobs: found, next } = await request(`/v1/jobs?${new URLSearchParams([...query, ["limit", PAGE]])}`);
@@ -139,7 +139,7 @@ function JobTable({ query: first, words }) {
     </p>
     <table class="job-table" role="table" aria-label="Jobs" hidden=${!jobs || none}>
       <thead role="rowgroup"><tr role="row">${COLUMNS.map((name) => html`<th role="columnheader">${name}</th>`)}</tr></thead>
-      <tbody role="rowgroup">${jobs?.map((job) => html`<${Row} key=${job.id} job=${job} act=${act} />`)}</tbody>
+      <tbody role="rowgroup">${jobs?.map((job) => html`<${Row} key=${job.id} job=${job} act=${act} refresh=${refresh} />`)}</tbody>
     </table>
     <${ListPages} path="/jobs" query=${query} older=${older} words="jobs" />`;
 }

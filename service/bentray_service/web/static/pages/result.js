@@ -1,13 +1,12 @@
 // The result of a reconstruction: image to measure in, how it was made, and what can be done with it.
-import { Thumbnail } from "../jobs/job_cards.js";
 import { Onward, onwardIn } from "../jobs/onward.js";
 import { go, keepQuery, parse, queryOf } from "../parts/address.js";
-import { kept, request, send } from "../parts/api.js";
+import { kept, request } from "../parts/api.js";
 import { ExportMenu, undrawn } from "../parts/export_menu.js";
-import { deleteRecord } from "../parts/lists.js";
+import { deleteRecord, Renamable, Thumbnail } from "../parts/lists.js";
 import { Provenance } from "../parts/provenance.js";
 import { ChoiceTable, facts, loadResult, nameOf, PlanTable, TruthTable } from "../parts/result_tables.js";
-import { Alert, Button, CopyButton, Facts, Form, html, Menu, useAct, useEffect, useRead, useRef, useState } from "../parts/view.js";
+import { Alert, Button, CopyButton, Facts, Form, html, Menu, useAct, useEffect, useRead, useState } from "../parts/view.js";
 import { inTime } from "../parts/words.js";
 import { QUANTITIES } from "../viewer/quantities.js";
 import { stateOf } from "../viewer/state.js";
@@ -44,7 +43,7 @@ function CompareMenu({ job }) {
   return html`<${Menu} title="Compare with">
     <${Form} class="sheet" onChange=${choose} onSubmit=${() => go(`/compare/${[job.id, ...chosen].join(",")}`)}>
       <div class="others">
-        ${others.map((other) => html`<label key=${other.id}><input type="checkbox" name="other" value=${other.id} /> <${Thumbnail} job=${other} />
+        ${others.map((other) => html`<label key=${other.id}><input type="checkbox" name="other" value=${other.id} /> <${Thumbnail} record=${other} />
           ${other.title}, ${isSame(other) ? "this scan" : "another scan"}, ${inTime(other.created)}</label>`)}
       </div>
       <${Facts}>One to three others</${Facts}>
@@ -53,21 +52,10 @@ function CompareMenu({ job }) {
   </${Menu}>`;
 }
 
-function Rename({ job, onRename }) {
-  const field = useRef(null);
-  useEffect(() => field.current.focus(), []);
-  const rename = ({ currentTarget: { elements } }) => onRename(elements.name.value.trim());
-  return html`<${Form} id="rename" class="rename" onSubmit=${rename}>
-    <label>Name <input name="name" type="text" maxlength="200" ref=${field} defaultValue=${job.name || ""} /></label>
-    <button type="submit">Rename</button>
-  </${Form}>`;
-}
-
 function Result({ result: first, query }) {
   const [job, setJob] = useState(first.job);
   const [state] = useState(() => stateOf(query));
   const [drawn] = useState(undrawn);
-  const [renaming, setRenaming] = useState(false);
   const [error, act] = useAct();
   const result = { ...first, job };
   const { volume, summary, values } = result;
@@ -77,10 +65,6 @@ function Result({ result: first, query }) {
     document.title = `${name} – Bentray`;
   }, [name]);
 
-  const rename = (changed) => act(async () => {
-    setJob(await send("PATCH", job.links.self, { name: changed }));
-    setRenaming(false);
-  });
   const remove = () => deleteRecord(act, `the result ${name}`, volume.links.self, "/jobs");
   // The view beside the job that goes on from this one.
   const keep = (view) => keepQuery(new URLSearchParams([...view, ...onwardIn(parse(location.hash).query)]));
@@ -88,7 +72,7 @@ function Result({ result: first, query }) {
   return html`<div class="wide screen">
     <div class="head">
       <p class="crumb"><a href="#/jobs">Jobs</a> · <a id="result-scan" href=${`#/scans/${job.dataset}`}>Scan</a></p>
-      <h1 id="result-name">${name}</h1>
+      <${Renamable} record=${job} field="name" name=${name} onRename=${setJob}><h1 id="result-name">${name}</h1></${Renamable}>
       <div id="result-actions" class="links">
         <${CompareMenu} job=${job} />
         <${ExportMenu} result=${result} drawn=${drawn} />
@@ -98,7 +82,6 @@ function Result({ result: first, query }) {
             <${CopyButton} title="Copy link" text=${() => location.href} />
             <${CopyButton} title="Copy as Python" text=${() => pythonOf(result, stored())} />
             <${CopyButton} title="Copy as curl" text=${() => curlOf(result, stored())} />
-            <${Button} onClick=${() => setRenaming(!renaming)}>Rename</${Button}>
             <${Button} onClick=${remove}>Delete</${Button}>
           </div>
         </${Menu}>
@@ -108,7 +91,6 @@ function Result({ result: first, query }) {
     <div id="result-cautions">
       ${summary.cautions.map(({ doubtful, text }) => html`<p class=${doubtful ? "error" : "notice"} role="note">${doubtful && "Doubtful result. "}${text}</p>`)}
     </div>
-    ${renaming && html`<${Rename} job=${job} onRename=${rename} />`}
     <${Alert} id="result-error" error=${error} />
     <${Onward} job=${job} summary=${summary} query=${query}>
       <${Viewer} panes=${[{ title: name, values, stored: summary.quantities, detail: width && 1e3 * width }]} state=${state} keep=${keep} drawn=${drawn} id="result-viewer" aria-label="Image" />

@@ -6,7 +6,8 @@ import { request, send } from "../parts/api.js";
 import { KeyLink, Picture } from "../parts/key.js";
 import { titleOf } from "../parts/lists.js";
 import { readSettings, SettingsForm, useSettings } from "../parts/settings_form.js";
-import { Alert, Button, Facts, Form, html, Section, useAct, useEffect, useRead, useReducer, useRef, useState } from "../parts/view.js";
+import { Alert, Button, Form, html, Section, useAct, useEffect, useRead, useReducer, useRef, useState } from "../parts/view.js";
+import { Waiting } from "../parts/waiting.js";
 import { planInWords, planOf, waitInWords } from "../parts/words.js";
 import { ScanEditor } from "../scans/scan_edit.js";
 import { Elements, factRows, inWordsOf, Quality } from "../scans/scan_facts.js";
@@ -28,7 +29,7 @@ function Preset({ id, name, title, words, scan, changes }) {
   const [estimate, error] = useRead(() => planOf(job), { key: changes });
   return html`<button id=${id} type="submit" value=${name}>${title}
     <small id=${`${name}-words`}>${words}</small>
-    <small class="time" id=${`${name}-time`} title=${estimate?.basis}>${estimate ? waitInWords(estimate) : error?.message ?? "…"}</small></button>`;
+    <small class="time" id=${`${name}-time`} title=${estimate?.basis}>${estimate ? waitInWords(estimate) : error?.message ?? "estimating the time"}</small></button>`;
 }
 
 // The plan of the settings in the form, in words: [words, later]; later() asks for it a moment after a change.
@@ -104,11 +105,14 @@ function About({ scan, geometry, geometryError, element, openWater, onChange }) 
   const water = scan.water_temperature_c ?? "";
   const [report, error] = useRead(() => request(address), { key: water });
   const [opened, setOpened] = useState(false);
+  // The water of the picture of the report that is shown.
+  const [drawn, setDrawn] = useState(null);
   const [waterError, act] = useAct();
   const useWater = (celsius) => act(async () => onChange(await send("PATCH", `/v1/datasets/${scan.id}`, { water_temperature_c: celsius })));
   return html`<${Section} id="about" title="Geometry and quality">
     <div class="about">
       <figure id="elements" class="figure">
+        ${!geometry && !geometryError && html`<${Waiting} words="Reading the geometry" />`}
         ${geometry && html`
           <${Elements} geometry=${geometry} chosen=${element} />
           <figcaption class="facts">${inWordsOf(geometry)}. Circles emit, dots receive.</figcaption>`}
@@ -124,7 +128,7 @@ function About({ scan, geometry, geometryError, element, openWater, onChange }) 
         <h3>Quality</h3>
         <div id="quality">
           ${report && html`<${Quality} report=${report} several=${scan.slices > 1} useWater=${useWater} />`}
-          ${!report && !error && html`<${Facts}>Checking the scan</${Facts}>`}
+          ${!report && !error && html`<${Waiting} words="Checking the scan" />`}
         </div>
         <${Alert} id="quality-error" error=${error ?? waterError} />
       </div>
@@ -132,7 +136,9 @@ function About({ scan, geometry, geometryError, element, openWater, onChange }) 
     <details id="quality-more" onToggle=${({ target }) => setOpened(opened || target.open)}>
       <summary>Matrix and histogram of the travel times, excluded pairs</summary>
       ${/* Another fragment after another temperature, or the browser would keep the picture that it has. */
-        opened && html`<${Picture} id="quality-picture" class="report" address=${`${address}.png#${water}`}
+        opened && html`
+          ${drawn !== water && html`<${Waiting} words="Drawing the report" />`}
+          <${Picture} id="quality-picture" class="report" address=${`${address}.png#${water}`} onShown=${() => setDrawn(water)} onError=${() => setDrawn(water)}
           alt="Traces with picks, matrix and histogram of the travel times, excluded pairs with reasons, findings" />`}
       <p><${KeyLink} id="quality-page" href=${`${address}.png`} target="_blank" rel="noopener">Quality report as an image</${KeyLink}></p>
     </details>

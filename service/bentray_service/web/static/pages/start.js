@@ -2,7 +2,7 @@
 import { go, keepQuery, pick } from "../parts/address.js";
 import { description, request, send } from "../parts/api.js";
 import { DropZone } from "../parts/drop_zone.js";
-import { Filters, ListPages, olderOf, titleOf } from "../parts/lists.js";
+import { Filters, ListPages, olderOf, Renamable, Thumbnail, titleOf } from "../parts/lists.js";
 import { Alert, Button, Choice, Facts, Field, Form, html, Section, useAct, useRead, useRef, useShown, useState } from "../parts/view.js";
 import { inTime } from "../parts/words.js";
 
@@ -63,7 +63,7 @@ function Sample() {
 // changes: a number that grows when the list is to be read again.
 function Scans({ first, changes }) {
   const [query, setQuery] = useState(first);
-  const [found, error] = useRead(async () => {
+  const [found, error, refresh] = useRead(async () => {
     const answer = await request(`/v1/datasets?${new URLSearchParams([...query, ["limit", PAGE_LENGTH]])}`);
     return { ...answer, query };
   }, { key: `${query} ${changes}`, settle: 0 });
@@ -82,8 +82,11 @@ function Scans({ first, changes }) {
     <p id="empty" class="empty" role="status" hidden=${!found || scans.length > 0}>${found && !scans.length && none}</p>
     <ul id="scans" class="records">
       ${scans.map((scan) => html`<li key=${scan.id}>
-        <a href=${`#/scans/${scan.id}`}>${titleOf(scan)}</a>
-        <${Facts}>${scan.ntx} emitters × ${scan.nrx} receivers · ${inTime(scan.created)}</${Facts}>
+        <${Thumbnail} record=${scan} />
+        <div>
+          <${Renamable} record=${scan} field="title" name=${scan.title} onRename=${refresh}><a href=${`#/scans/${scan.id}`}>${titleOf(scan)}</a></${Renamable}>
+          <${Facts}>${scan.ntx} emitters × ${scan.nrx} receivers · ${inTime(scan.created)}</${Facts}>
+        </div>
       </li>`)}
     </ul>
     ${found && html`<${ListPages} id="scan-pages" path="/" query=${found.query} older=${olderOf(found.next)} words="scans" />`}

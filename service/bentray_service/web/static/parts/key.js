@@ -10,7 +10,7 @@ const hasHeaders = () => Object.keys(authorization()).length > 0;
 const blobOf = async (address) => (await respond(address)).blob();
 
 // A picture of the service, once the reader comes near it. With headers, which its element cannot send, it is fetched for it.
-export function Picture({ address, onError = () => {}, ...more }) {
+export function Picture({ address, onShown = () => {}, onError = () => {}, ...more }) {
   const image = useRef(null);
   useEffect(() => {
     if (!hasHeaders()) return undefined;
@@ -22,7 +22,11 @@ export function Picture({ address, onError = () => {}, ...more }) {
     near.observe(image.current);
     return () => near.disconnect();
   }, [address]);
-  return html`<img ref=${image} loading="lazy" src=${hasHeaders() ? undefined : address} onLoad=${({ target }) => URL.revokeObjectURL(target.src)}
+  const onLoad = ({ target }) => {
+    URL.revokeObjectURL(target.src);
+    onShown();
+  };
+  return html`<img ref=${image} loading="lazy" src=${hasHeaders() ? undefined : address} onLoad=${onLoad}
     onError=${onError} ...${more} />`;
 }
 

@@ -1,7 +1,8 @@
-// Lists of records: titles, pages of a list that is newest first, and fields that search while one types.
-import { go, linkTo } from "./address.js";
-import { request } from "./api.js";
-import { Form, html, useLater } from "./view.js";
+// Lists of records: titles, names changed in place, thumbnails, pages of a list that is newest first, and fields that search while one types.
+import { go, linkTo, queryOf } from "./address.js";
+import { request, send } from "./api.js";
+import { Picture } from "./key.js";
+import { Alert, Form, html, useAct, useLater, useLayoutEffect, useRef, useState } from "./view.js";
 
 const TYPING_MS = 300;
 
@@ -24,6 +25,50 @@ export function titleOfJob(job) {
   const field = ["mesh", "dataset", "volume"].find((one) => job[one]);
   const record = field && known[FIELDS[field]].get(job[field]);
   return record ? titleOf(record) : field ? job[field] : job.id;
+}
+
+// A small picture beside the name of a scan or a job: it says nothing to a screen reader, which reads the name.
+export function Thumbnail({ record: { links: { thumbnail, field, image } } }) {
+  const [failed, setFailed] = useState(false);
+  const view = field ? { width: 96, height: 96, rays: 2 } : { frame: false, size: 96 };
+  const address = thumbnail ?? (image && `${image}?${queryOf(view)}`);
+  return address && !failed && html`<${Picture} class="thumbnail" address=${address} alt="" onError=${() => setFailed(true)} />`;
+}
+
+// A name, shown by children, with a pencil that puts a field in its place: Enter saves, Escape leaves it as it was. field: of the record of a scan
+// ("title") or a job ("name"); name: with which the field begins; onRename(record) gets the changed record.
+export function Renamable({ record, field, name, onRename, children }) {
+  // null before the first change.
+  const [editing, setEditing] = useState(null);
+  const [error, act, setError] = useAct();
+  const [input, pencil] = [useRef(null), useRef(null)];
+  // Before the next key is typed.
+  useLayoutEffect(() => {
+    if (editing) input.current.select();
+    else if (editing !== null) pencil.current.focus();
+  }, [editing]);
+  const edit = (begun) => {
+    setError(null);
+    setEditing(begun);
+  };
+  const save = () => act(async () => {
+    const typed = input.current.value.trim();
+    if (typed !== name) {
+      const changed = await send("PATCH", record.links.self, { [field]: typed });
+      for (const records of Object.values(known)) if (records.has(changed.id)) records.set(changed.id, changed);
+      await onRename(changed);
+    }
+    setEditing(false);
+  });
+  if (!editing) {
+    return html`<span class="named" onDblClick=${() => edit(true)}>${children}
+      <button type="button" class="pencil" ref=${pencil} title="Rename" aria-label=${`Rename ${name}`} onClick=${() => edit(true)}></button></span>`;
+  }
+  return html`<${Form} class="named" onSubmit=${save} onKeyDown=${({ key }) => key === "Escape" && edit(false)}>
+    <input type="text" maxlength="200" ref=${input} defaultValue=${name} aria-label=${`New name of ${name}`} />
+    <small>Enter saves, Escape leaves it</small>
+    <${Alert} error=${error} />
+  </${Form}>`;
 }
 
 // Deletes a record for good after a question, and opens another page. act: of useAct.

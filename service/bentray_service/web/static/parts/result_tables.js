@@ -79,7 +79,7 @@ export function TruthTable({ truth }) {
     ...(truth.uncertainty_mps === null ? [] : [["Uncertainty of the mean", `${number(truth.uncertainty_mps, 1)} m/s`]]),
     ["True mean ± spread", speed(truth.true_mean_mps, truth.true_spread_mps)],
   ];
-  return html`<${Section} title="Against the truth" words=${`In ${truth.region}, ${truth.nodes} nodes.`}><${Pairs} rows=${rows} /></${Section}>`;
+  return html`<${Section} title="Against the truth" words=${`In ${truth.region.replace(/^mask/, "the region mask")}, ${truth.nodes} nodes.`}><${Pairs} rows=${rows} /></${Section}>`;
 }
 
 export function PlanTable({ plan }) {

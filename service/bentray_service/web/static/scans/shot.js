@@ -2,6 +2,7 @@
 import { request } from "../parts/api.js";
 import { keyHandler } from "../parts/pointers.js";
 import { Alert, Choice, Facts, Field, html, Section, useEffect, useLayoutEffect, useRead, useRef, useSize, useState } from "../parts/view.js";
+import { Waiting } from "../parts/waiting.js";
 import { float32Of } from "../viewer/npy.js";
 import { Axes, ticks } from "../viewer/plot.js";
 
@@ -132,6 +133,7 @@ export function Shot({ scan, hasWater, onEmission }) {
       <${Choice} caption="Traces" label=${{ id: "shot-shots", hidden: !hasWater }} id="shot-quantity" entries=${SHOTS} chosen=${quantity}
         onChange=${({ target }) => setQuantity(target.value)} />
     </div>
+    ${!shot && !error && html`<${Waiting} words="Reading the traces" />`}
     <${Traces} shot=${shot} cursor=${receiver} id="shot" aria-describedby="shot-keys" aria-label=${label} onPoint=${point} onKeyDown=${onKeyDown} />
     <${Facts} id="shot-legend">${shot && hasWater !== null && html`<${Legend} shot=${shot} hasWater=${hasWater} />`}</${Facts}>
     <p class="facts" id="shot-facts" role="status">${shot && factsOf(shot)}</p>

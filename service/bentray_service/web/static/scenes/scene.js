@@ -6,6 +6,7 @@ import { DropZone } from "../parts/drop_zone.js";
 import { deleteRecord, titleOf } from "../parts/lists.js";
 import { keyHandler, usePointers } from "../parts/pointers.js";
 import { Alert, Button, Choice, Facts, Form, html, Section, useAct, useEffect, useLater, useNewest, useRef, useState } from "../parts/view.js";
+import { Waiting } from "../parts/waiting.js";
 import { inTime } from "../parts/words.js";
 import { PictureStream, rateOf } from "./picture_stream.js";
 
@@ -130,7 +131,7 @@ function Stage({ id, words, hint, describe, onShown = () => {}, onError, camera,
   return html`
     <div id="stage" class="stage" ref=${stage} tabindex="0" role="group" aria-label=${words[0]} ...${orbit}>
       <canvas id=${id} ref=${canvas} width=${FULL_PX} height=${FULL_PX} role="img" aria-label=${shown?.label ?? words[1]}></canvas>
-      <p class="hint" id="stage-hint" hidden=${shown !== null}>${hint}</p>
+      <div class="hint" id="stage-hint" hidden=${shown !== null}>${hint}</div>
     </div>
     <${Facts} id="view-facts">${shown?.facts}</${Facts}>`;
 }
@@ -152,7 +153,8 @@ export function ScenePage(props) {
     <h1>${title}</h1>
     <section aria-label=${title} class="panel viewer">
       <div>
-        <${Stage} onError=${scene.setError} camera=${camera} stream=${scene.stream} ...${stage} />
+        <${Stage} onError=${scene.setError} camera=${camera} stream=${scene.stream} ...${stage}
+          hint=${record && !scene.error ? html`<${Waiting} words="Drawing the first picture" />` : stage.hint} />
         <${Alert} id=${`${form}-error`} error=${scene.error} />
         ${below}
       </div>

@@ -1,5 +1,6 @@
 // Results on canvases with one range of colours and one cursor: quantities, planes, window, profile, region.
 import { Alert, html, useEffect, useLater, useMemo, useRead, useReducer, useRef, useState } from "../parts/view.js";
+import { Waiting } from "../parts/waiting.js";
 import { ColourBar } from "./colour_bar.js";
 import { ChoiceBar, Colours, Drawing, Keys, Overlay, percent, Slices, Swipe, Switch, Tools } from "./controls.js";
 import { AXES, nodeAt, shownPlane } from "./field.js";
@@ -258,7 +259,7 @@ export function Viewer({ panes, state, keep, drawn, ...more }) {
       ${others.length > 0 && html`<${Overlay} entries=${others.map((name) => [name, QUANTITIES[name].title])} state=${state} change=${change} />`}
     </div>
     <${Alert} error=${error} />
-    <p class="loading" role="status" hidden=${!words}>${words}</p>
+    ${words && html`<${Waiting} class="loading" role="status" words=${words} />`}
     ${read && html`<${Body} read=${read} panes=${panes} state=${state} change=${change} drawn=${drawn} />`}
   </section>`;
 }
