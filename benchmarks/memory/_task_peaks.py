@@ -50,9 +50,11 @@ def measured(folder: Path, *jobs: Job) -> Iterator[dict[str, Measured]]:
             plan = job.run(client, own)
             peaks = of_worker(client, _end)
             whole = peaks.pop(WHOLE)
-            largest = max(peaks or plan, key=lambda name: peaks.get(name, plan[name].bytes))
+            # Tasks without a plan of their own, as those that judge candidates, run within that of others.
+            peaks = {name: peak for name, peak in peaks.items() if name in plan}
+            largest = max(peaks or plan, key=lambda name: peaks[name] if peaks else plan[name].bytes)
             peaks[largest] = max(whole, peaks.get(largest, 0))
-            yield {name: Measured(plan[name], peak - idle) for name, peak in peaks.items() if name in plan}
+            yield {name: Measured(plan[name], peak - idle) for name, peak in peaks.items()}
 
 
 # Key of the peak of all that runs in a worker.
