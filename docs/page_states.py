@@ -121,6 +121,7 @@ def states(service: _Service) -> dict[str, State]:
         "job-cancelled": (f"/jobs/{cancelled}", "ancelled", stay),
         "job-failed": (f"/jobs/{failed}", "damaged", stay),
         "result": (f"/jobs/{ways[0]}?{MARKS}", "node ", stay),
+        "result-overlay": (f"/jobs/{ways[0]}?over=coverage&interpolation=linear&{MARKS}", "node ", stay),
         "result-planes": (f"/jobs/{stack}?planes=3", "node ", stay),
         "comparison": (f"/compare/{pair}?{MARKS}", "m/s · B", stay),
         "comparison-difference": (f"/compare/{pair}?mode=difference", "Swipe", stay),

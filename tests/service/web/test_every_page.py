@@ -50,7 +50,7 @@ def places(shared_service):
         "/": "Sixteen elements",
         # With the form of all settings open, and that of corrections with a refusal.
         f"/scans/{sent['id']}?from={plane[0]}": "Receiving element 0",
-        f"/jobs/{plane[0]}?{marks}": "node ",
+        f"/jobs/{plane[0]}?{marks}&over=coverage": "node ",
         f"/jobs/{volume}?planes=3": "node ",
         # Under way, with an image and a curve; and failed.
         f"/jobs/{live['id']}": "Stage 1, iteration 2",

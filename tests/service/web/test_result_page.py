@@ -118,6 +118,10 @@ def test_image_colour_bar_and_read_out_fit_the_window(page, result, size):
         expect(page.locator(shown)).to_be_in_viewport(ratio=1.0)
     canvas = page.locator("canvas.plane").bounding_box()
     assert min(canvas["width"], canvas["height"]) >= 350
+    page.get_by_label("Overlay", exact=True).select_option("attenuation")
+    for bar in (0, 1):
+        expect(page.locator("#result-viewer .colour-bar").nth(bar)).to_be_in_viewport(ratio=1.0)
+    expect(page.locator("#result-viewer canvas.plane")).to_be_in_viewport(ratio=1.0)
     assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
 
 

@@ -71,7 +71,7 @@ export function figureOf({ panels, bars }, caption, marked) {
   const images = panels.map((panel) => ({ ...panel, ...seen(panel.look, panel.size) }));
   const sides = images.map(({ limits: [x0, x1, y0, y1] }) => [x1 - x0, y1 - y0]);
   const { columns, rows, scale, cell } = images.map((_, k) => inColumns(sides, k + 1)).sort((one, other) => other.scale - one.scale)[0];
-  const width = Math.max(LEAST_WIDTH, columns * cell);
+  const width = Math.max(LEAST_WIDTH, Math.ceil(columns * cell));
   const titles = images.map(({ title }) => (title ? wrapped(title, cell - LEFT) : []));
   const top = TOP + LINE * Math.max(...titles.map((lines) => lines.length));
   const across = (width - columns * cell) / 2;
