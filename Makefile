@@ -63,7 +63,7 @@ bench-device: install ## measure each engine and whole reconstructions on the Op
 	@mkdir -p build/bench
 	@$(BIN)/bentray bench devices $(ARGS) --json build/bench/devices.json
 
-mutants: install-tests ## plant faults in the numerics by Cosmic Ray and run the nearest tests (hours); ARGS="--count 20" narrows it
+mutants: install-tests ## plant faults in the numerics by Cosmic Ray and run the nearest tests (hours); ARGS="--count 20" narrows it, ARGS="--part service" takes the service
 	@test -x build/mutants/venv/bin/cosmic-ray || { $(BIN)/python -m venv build/mutants/venv && \
 	  build/mutants/venv/bin/pip install -q 'cosmic-ray>=8.7,<9'; }
 	@build/mutants/venv/bin/python tests/mutants.py $(ARGS)
