@@ -40,7 +40,7 @@ def recovery(problem: Problem, blocks: Sequence[Rows], width: float = 0.0) -> Fl
     """
     shape = problem.region.shape
     crossing = problem.spacing / problem.water_speed
-    board = np.where(problem.region, _checkerboard(shape) * CONTRAST * crossing, 0.0)
+    board = np.where(problem.region, checkerboard(shape) * CONTRAST * crossing, 0.0)
     seen = blurred(board, width)
     rows = [replace(block, residual=block.project(seen)) for block in blocks]
     density = problem.mean_in_region(ray_density(problem, blocks))
@@ -54,7 +54,7 @@ def recovery(problem: Problem, blocks: Sequence[Rows], width: float = 0.0) -> Fl
     return np.where(problem.region, correlation / np.maximum(energy, 1e-300), 0.0)
 
 
-def _checkerboard(shape: tuple[int, ...]) -> Floats:
+def checkerboard(shape: tuple[int, ...]) -> Floats:
     """+1 and −1 by turns, in fields of ``FIELD_NODES`` nodes."""
     fields = sum(np.ix_(*(np.arange(n) // FIELD_NODES for n in shape)))
     return np.asarray(1.0 - 2.0 * (fields % 2))

@@ -255,6 +255,17 @@ def test_sigma_of_a_missing_time_is_of_no_interest():
     np.testing.assert_array_equal(np.isnan(dataset.sigma_s), FAILED)
 
 
+@pytest.mark.parametrize("name", ["tof_s", "delta_tof_s"])
+def test_a_scan_that_lost_more_times_than_it_has_is_refused(name):
+    for lost in (496, 497):
+        times = getattr(RIGHT, name).copy()
+        times[tuple(np.argwhere(OTHER)[:lost].T)] = np.inf
+        if lost == 496:
+            check_plausible(with_times(name, times))
+    with pytest.raises(InvalidInput, match=rf"^traveltime/{name}: found .*497 infinite\) and only 495"):
+        check_plausible(with_times(name, times))
+
+
 @pytest.mark.parametrize("part", [0.2, 0.45, 0.9])
 def test_a_scan_without_most_of_its_times_is_not_usable_unless_the_user_insists(part):
     failed = OTHER & (np.random.default_rng(2).random((32, 32)) < part)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels.tomography import Settings, reconstruct
+from bentray_kernels.tomography.resolution import checkerboard
 
 from ..straight_scans import ring_scan
 
@@ -19,6 +20,10 @@ def scan(keep=True):
 @pytest.fixture(scope="module")
 def everywhere():
     return reconstruct(scan(), PLAN)
+
+
+def test_fields_of_four_nodes_alternate_along_each_axis():
+    assert np.array_equal(checkerboard((12, 8)), np.kron([[1, -1], [-1, 1], [1, -1]], np.ones((4, 4))))
 
 
 def test_many_rays_bring_most_of_it_back(everywhere):
