@@ -35,6 +35,11 @@ def test_both_images_have_one_range_and_one_cursor(page, both):
         assert np.abs(np.subtract(computed, expected, dtype=int)).max() <= 4
         expect(page.locator(".readout")).to_contain_text(f"{FIRST[node]:.2f} m/s")
         expect(page.locator(".readout")).to_contain_text(f"{SECOND[node]:.2f} m/s")
+    page.get_by_text("Export", exact=True).click()
+    with page.expect_download() as download:
+        page.get_by_role("button", name="SVG").click()
+    figure = download.value.path().read_text()
+    assert [figure.count(part) for part in ("<image", "A:", "B:")] == [2, 1, 1]
 
 
 @pytest.mark.nightly
