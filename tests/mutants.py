@@ -164,7 +164,7 @@ def faults(module: Path, tests: list[Path], count: int, seed: int) -> list[dict[
         if result.worker_outcome != WorkerOutcome.SKIPPED:
             # Cosmic Ray counts a time-out as killed, but a machine under load looks the same.
             outcome = "timed out" if result.output == "timeout" else result.test_outcome.value
-            by = re.findall(r"^(?:FAILED|ERROR) (.+?)(?: - |$)", result.output, re.MULTILINE)
+            by = re.findall(r"^(?:FAILED|ERROR) (tests/.+?)(?: - |$)", result.output, re.MULTILINE)
             if by and subprocess.run(pytest + by, cwd=TREE, capture_output=True, check=False).returncode:
                 outcome = "fails without a fault"
             tried.append({"module": name, "outcome": outcome, "by": by, "fault": result.diff})
