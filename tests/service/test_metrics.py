@@ -1,6 +1,7 @@
 """Metrics: named by one rule, counted by the route's own words, and true."""
 
 import re
+import shutil
 import subprocess
 import time
 from pathlib import Path
@@ -9,10 +10,13 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 from sqlalchemy import text
 
+from bentray_service.backup.archive import NEWEST
 from bentray_service.metrics import TENANTS
 from bentray_service.rows import usage
 from bentray_service.rows.ids import LOCAL, Tenant
 from bentray_service.rows.keys import ApiKey, Keys
+from bentray_workers.cluster.scheduler_load import SchedulerLoad
+from bentray_workers.cluster.worker_health import WorkerHealth
 
 from .conftest import signed
 
@@ -96,6 +100,40 @@ def test_the_queue_who_waits_and_how_long_it_takes(http, uploaded, submitted, un
     assert value(http, "bentray_workers") == 0
     assert value(http, "bentray_workers_lost_total") == 3
     assert value(http, "bentray_disk_free_bytes") > 0
+
+
+def test_what_alarms_read_of_workers_scheduler_disk_and_backup(http, monkeypatch):
+    compute, files = http.app.state.background.runner.compute, http.app.state.stores.files
+    workers = tuple(
+        WorkerHealth(2, memory, limit, None, tasks, paused, opencl=False, compiling=False)
+        for memory, limit, tasks, paused in ((30, 100, 1, False), (80, 100, 2, True), (None, 0, 0, False))
+    )
+    monkeypatch.setattr(compute, "health", lambda: workers)
+    monkeypatch.setattr(compute, "scheduler_load", lambda: SchedulerLoad(7, 3, 5))
+    assert "bentray_backup_timestamp_seconds" not in read(http)
+    (files.root / NEWEST).write_text('{"finished": 1e9}')
+    seen = {name: family.samples[0].value for name, family in read(http).items() if family.samples}
+    expected = {
+        "workers": 3,
+        "workers_memory_bytes": 110,
+        "workers_memory_limit_bytes": 200,
+        "workers_fullest_ratio": 0.8,
+        "workers_threads": 6,
+        "workers_running_tasks": 3,
+        "workers_paused": 1,
+        "scheduler_up": 1,
+        "scheduler_tasks": 7,
+        "scheduler_waiting_tasks": 3,
+        "scheduler_memory_bytes": 5,
+        "storage_up": 1,
+        "disk_total_bytes": shutil.disk_usage(files.root).total,
+        "disk_needed_bytes": http.app.state.access.settings.min_free_bytes,
+        "backup_timestamp_seconds": 1e9,
+    }
+    assert {name: seen[f"bentray_{name}"] for name in expected} == expected
+    monkeypatch.setattr(compute, "scheduler_load", lambda: None)
+    assert value(http, "bentray_scheduler_up") == 0
+    assert "bentray_scheduler_tasks" not in read(http)
 
 
 def test_database_connections_and_the_end_of_keys(http):
