@@ -166,7 +166,8 @@ def pictures(world: World) -> tuple[int, Use]:
 
     async def run(tenant: Tenant) -> None:
         scan = DatasetRow(id=new_id("dataset"), tenant=tenant)
-        task = asyncio.ensure_future(made._made(scan, Cost(0.0, 0), lambda path: PictureTasks([], None)))
+        tasks = made._made(scan, Cost(0.0, 0), "image", lambda path: PictureTasks([], None))
+        task = asyncio.ensure_future(tasks)
         await asyncio.sleep(0.0)
         if task.done():
             await task
