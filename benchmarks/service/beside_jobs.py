@@ -21,7 +21,7 @@ from bentray_service.cli.output.benchmark_row import Row
 from ..shared._synthetic_scan import made_up_bursts, made_up_scan
 from ._http_load import beside, served
 from ._short_jobs import ENDED
-from .orbit import PREVIEW, mesh_file, stored, stored_volume
+from .orbit import PREVIEW, VOLUMES, Shown, mesh_file, stored, stored_volume
 
 SETTINGS = {"BENTRAY_WORKERS": "2", "BENTRAY_REQUESTS_PER_MINUTE": "0"}
 # A scan of 128 x 256 traces, and faces along and around the mesh of a field that takes minutes.
@@ -110,8 +110,8 @@ class _Page:
             words = f"median {np.median(taken):.2f} s, longest {max(taken):.2f} s of {len(taken)}"
             p95 = float(np.percentile(taken, 95))
             yield Row(f"{action.name} {when}, p95", p95, action.goal_s, "<=", "s", _loaded(words))
-        for name, mode in (("glass", GLASS), ("clay", CLAY)):
-            yield Row(f"dragging {name} {when}", self._dragged(mode), 8.0, ">=", "1/s", _loaded("256²"))
+        for name, shown in zip(("clay", "glass"), VOLUMES, strict=True):
+            yield Row(f"dragging {name} {when}", self._dragged(shown), 8.0, ">=", "1/s", _loaded("256²"))
         taken = [_seconds(lambda _: self._done(SHORT), k) for k in range(QUICK_JOBS if quick else JOBS)]
         words = f"median {np.median(taken):.1f} s of {len(taken)}, from submission to end"
         yield Row(f"short job {when}, longest", max(taken), 15.0, "<=", "s", _loaded(words))
@@ -143,12 +143,12 @@ class _Page:
     def _state(self, job: str) -> str:
         return str(self._got(f"/v1/jobs/{job}").json()["state"])
 
-    def _dragged(self, mode: dict[str, Any]) -> float:
-        """Previews a second, each of another view, one request at a time."""
+    def _dragged(self, shown: Shown) -> float:
+        """Previews of the page a second, each of another view, one request at a time."""
         begun, number = time.perf_counter(), 0
         while (lasted := time.perf_counter() - begun) < DRAG_S:
             number += 1
-            view = {**mode, **PREVIEW, "azimuth_deg": 0.7 * number, "supersampling": "none"}
+            view = {**shown.view, **shown.preview, **PREVIEW, "azimuth_deg": 0.7 * number}
             self._got(f"/v1/volumes/{self._volume}/refraction.png", **view)
         return number / lasted
 
