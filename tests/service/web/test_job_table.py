@@ -59,6 +59,7 @@ def test_a_link_restores_filters(page, address, queued):
     assert page.url.endswith("#/jobs")
     page.get_by_role("link", name="Right").click()
     page.get_by_text("Next in the queue").wait_for()
+    page.get_by_text("0 jobs run on 1 worker").wait_for()
     assert page.url.endswith(f"#/jobs/{right['id']}")
 
 

@@ -219,6 +219,11 @@ def own_traced(page, address, tmp_path):
     return opened(page, address, with_traces(address, tmp_path))
 
 
+def busy(**queue):
+    """An answer of GET /v1/cluster with two busy workers."""
+    return {"workers": [{"compiling": False}] * 2, "queue": {"drawing_workers": 2, "all_running": 1, **queue}}
+
+
 def test_the_numbers_of_the_page_are_those_of_the_service(page, traced):
     facts = page.locator("#scan-facts")
     expect(facts).to_contain_text("8.000 MHz")
@@ -232,10 +237,22 @@ def test_the_numbers_of_the_page_are_those_of_the_service(page, traced):
     expect(quality.locator("ul:not(details *) > li")).to_have_count(len(report["findings"]))
     for finding in report["findings"]:
         expect(quality).to_contain_text(finding["found"])
+    # The picture of the report is held back, and two workers are busy.
+    held = []
+    page.route("**/quality.png", lambda route: held.append(route))
+    loads = [{"waiting_images": 1, "images_s": 3.2}, {"waiting_images": 0, "images_s": None}]
+    page.route("**/v1/cluster", lambda route: route.fulfill(json=busy(**loads[0])))
     page.get_by_text("Matrix and histogram of the travel times").click()
+    page.get_by_text(
+        "Drawing the report · waiting for a worker: 2 of 2 busy, about 4 s"
+    ).wait_for()
+    del loads[0]
+    page.get_by_text("Drawing the report · a worker computes it", exact=True).wait_for()
+    held[0].continue_()
     report = page.get_by_role("img", name="matrix and histogram of the travel times")
     expect(report).not_to_have_js_property("naturalWidth", 0)
     assert httpx.get(page.get_by_role("link", name="Quality report").evaluate("one => one.href")).is_success
+    expect(page.get_by_text("Drawing the report")).to_have_count(0)
     drawing = page.get_by_role("img", name="12 elements, 12 emit, 12 receive")
     expect(drawing.locator(".emitter")).to_have_count(12)
     expect(drawing.locator(".receiver")).to_have_count(12)

@@ -3,7 +3,7 @@ import { inWords, request } from "../parts/api.js";
 import { loadTitles, titleOfJob } from "../parts/lists.js";
 import { Alert, Button, html, useNewest, useRead, useRef, useState } from "../parts/view.js";
 import { jobsInWords, Waiting } from "../parts/waiting.js";
-import { duration, placeInQueue, settingsOf } from "../parts/words.js";
+import { duration, placeInQueue, settingsOf, waitInWords } from "../parts/words.js";
 import { useJobs } from "./followed_jobs.js";
 import { Plan } from "./job_cards.js";
 import { comparesModels, MisfitCurve } from "./misfit_curve.js";
@@ -39,7 +39,10 @@ function iterationOf({ history, settings }) {
 // What happens now, in a line.
 function happening(job) {
   const { done, total, phase } = job.progress;
-  if (job.state === "queued") return job.ahead === null ? "Waiting in the queue" : placeInQueue(job.ahead);
+  if (job.state === "queued") {
+    const then = job.minutes === null ? "" : `, then ${waitInWords({ minutes: job.minutes })}`;
+    return job.ahead === null ? "Waiting in the queue" : `${placeInQueue(job.ahead)}${then}`;
+  }
   if (STATES[job.state]) return STATES[job.state];
   if (phase === COMPILING) return `Compiling kernels for this processor, once: ${done} of ${total}`;
   if (PHASES[phase]) return PHASES[phase];
