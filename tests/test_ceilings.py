@@ -23,7 +23,7 @@ LINES = {
     ("kernels", "workers", "service"): (92_268, 87_000),
     ("service",): (32_136, 31_000),
     # 88 more on 28 November: planted faults in the service, and three tests of what none had seen.
-    ("tests",): (66_537, 58_000),
+    ("tests",): (66_548, 58_000),
     # 70 more on 28 November: triangulations are intersected by Embree too, the better peer.
     ("benchmarks",): (15_340, 13_000),
 }

@@ -1,5 +1,6 @@
 """/v1/jobs/{id}/events and /v1/events: every change once, in order, from where the client was, and an end."""
 
+import asyncio
 import json
 import threading
 import time
@@ -16,7 +17,7 @@ from bentray_service.rows.ids import LOCAL, Tenant
 
 from ...clock import Clock
 from ...waiting import wait_until
-from ..conftest import refused
+from ..conftest import PATIENCE_S, refused
 
 
 @pytest.fixture(autouse=True)
@@ -62,13 +63,23 @@ def test_a_job_from_its_beginning_to_its_end(http, running, work):
         refused(http.get(here, headers={"Last-Event-ID": last}), "last-event-id")
 
 
-def test_it_ends_when_the_service_leaves(http, running):
+def test_it_ends_when_the_service_leaves(http, running, monkeypatch):
+    told_ends = []
+
+    async def told_only(watched, _seconds):
+        async with asyncio.timeout(PATIENCE_S):
+            await watched._news.wait()
+            told_ends.append(http.app.state.leaving.is_set())
+
+    # It does not find out at its next comment.
+    monkeypatch.setattr(feed.Watched, "wait_for_change", told_only)
     job = running(http)
     # By then it has sent what it has read.
     once_watched(http, http.app.state.leaving.set, 0.2)
     told = parsed(http.get(f"/v1/jobs/{job['id']}/events").text)
     states = [json.loads(one["data"])["state"] for one in told if one["event"] == "state"]
     assert states == ["queued", "running"]
+    assert told_ends[-1]
 
 
 def test_heartbeats_are_sent(serve, running, work, monkeypatch):
