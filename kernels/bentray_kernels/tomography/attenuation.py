@@ -5,11 +5,11 @@ Experimental: see ``EXPERIMENTAL``.
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Flags, Floats, Ints
 from ..errors import InvalidInput
 from . import attenuation_sart
 from .focusing import focusing
@@ -33,8 +33,27 @@ PASSES, ROBUST_PASSES = 3, 12
 # simulations, where total variation did worse (``benchmarks/results/raw_trace_experiments.md``).
 ZONES, TRACES_STRICTER = 3.0, 2.0
 
+# For validation one in so many of these solutions, and of the iterations of SART, is made. On the scans that
+# ``cautions.CLEARLY`` was chosen on, all of them gave the same verdicts.
+VALIDATED = 4
+
 # More than any tissue has at the frequencies that pass through it, Np/m.
 MAX_NP_M = 500.0
+
+
+@dataclass(frozen=True)
+class Losses:
+    """An attenuation image, and how well amplitudes of held-out views are predicted without them.
+
+    Attributes:
+        image: of the region's shape, Np/m.
+        held_out: number of pairs held out, and the sums of their squared misfits, Np², by an image of the
+            training pairs and by the one attenuation inside the array that fits these best; zeros without
+            such pairs.
+    """
+
+    image: Floats
+    held_out: Floats
 
 
 def active_emitters(problem: Problem) -> Ints:
@@ -78,11 +97,45 @@ def _without_focusing(problem: Problem, settings: Settings, slowness: Floats, em
     return replace(problem, log_ratio=ratio)
 
 
-def solve(problem: Problem, settings: Settings, blocks: Sequence[Rows]) -> Floats:
+def validate(
+    problem: Problem, settings: Settings, blocks: Sequence[Rows], training: Flags, held_out: Flags
+) -> Floats:
+    """``Losses.held_out`` of the rows of all emitters.
+
+    Scattered pairs would not do: their neighbours have the same focusing, which an image fits.
+
+    Args:
+        training, held_out: (rays,), in the order of the rows.
+    """
+    ends = np.cumsum([block.residual.size for block in blocks])[:-1]
+    shown, held = (
+        [block.chosen(rays) for block, rays in zip(blocks, np.split(part, ends), strict=True)]
+        for part in (training, held_out)
+    )
+    water = problem.water_attenuation
+    image = (solve(problem, settings, shown, VALIDATED) - water) * problem.spacing
+    inside = np.where(problem.region, problem.spacing, 0.0)
+    lengths, data = _projected(shown, inside), np.concatenate([part.residual for part in shown])
+    constant = max(float(lengths @ data) / max(float(lengths @ lengths), 1e-300), -water)
+    measured = np.concatenate([part.residual for part in held])
+    misfits = (measured - _projected(held, values) for values in (image, constant * inside))
+    return np.array([measured.size, *(float(misfit @ misfit) for misfit in misfits)])
+
+
+def _projected(rows: Sequence[Rows], image: Floats) -> Floats:
+    return np.concatenate([part.project(image) for part in rows])
+
+
+def solve(problem: Problem, settings: Settings, blocks: Sequence[Rows], one_in: int = 1) -> Floats:
     """The attenuation from the rows of all emitters, in their order.
 
     The rays are fixed, so the problem is linear: log ratios are integrals of the attenuation, once focusing
     is taken off. It is solved for all rays at once with a penalty, or by SART, see ``attenuation_sart``.
+
+    Args:
+        problem, settings: of the rows.
+        blocks: rows.
+        one_in: the solutions or iterations are fewer by this factor.
 
     Returns:
         of the region's shape, Np/m, at least 0; that of the water outside the array.
@@ -97,7 +150,8 @@ def solve(problem: Problem, settings: Settings, blocks: Sequence[Rows]) -> Float
         return water / problem.spacing
     bounds = (0.0, MAX_NP_M * problem.spacing)
     if settings.numerics.attenuation_solver == "sart":
-        return attenuation_sart.solve(blocks, water, problem.region, settings, bounds) / problem.spacing
+        fewer = settings.changed(iterations=max(1, settings.iterations // one_in))
+        return attenuation_sart.solve(blocks, water, problem.region, fewer, bounds) / problem.spacing
     image, dual = water, np.zeros((len(shape), *shape))
     # Rays through a blurred speed image are all somewhat off, and none is an outlier: on Table 6 after SART
     # the limit made the error larger, after Gauss–Newton a third smaller.
@@ -105,7 +159,8 @@ def solve(problem: Problem, settings: Settings, blocks: Sequence[Rows]) -> Float
     smooth = None
     if settings.reads_amplitudes:
         spreads, smooth = settings.numerics.huber_scale / TRACES_STRICTER, _smoothing(problem, settings)
-    for _ in range(ROBUST_PASSES if spreads and smooth is None else PASSES):
+    passes = ROBUST_PASSES if spreads and smooth is None else PASSES
+    for _ in range(max(1, passes // one_in)):
         remaining = [replace(part, residual=part.residual - part.project(image - water)) for part in blocks]
         residual = np.concatenate([block.residual for block in remaining])
         limit = huber.limit(residual, spreads)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..task_graph import Checkpoint
+from .attenuation import Losses
 from .gauss_newton import gauss_newton_step
 from .reconstruction_graph import ReconstructionCheckpoint
 from .result import Iteration
@@ -26,6 +27,7 @@ TYPES: Mapping[str, type] = MappingProxyType(
             gauss_newton_step.Iterate,
             gauss_newton_step.Measured,
             Iteration,
+            Losses,
             Uncertainty,
         )
     }

@@ -17,7 +17,13 @@ from ..arrays import Floats
 from ..task_graph import ThreadPool, run
 from . import pairs
 from .attenuation import EXPERIMENTAL
-from .cautions import bound_cautions, fit_cautions, with_settings_caution
+from .cautions import (
+    attenuation_cautions,
+    bound_cautions,
+    fit_cautions,
+    held_out_amplitudes,
+    with_settings_caution,
+)
 from .gauss_newton.gauss_newton_step import Iterate
 from .geometry_summary import geometry_summary
 from .model_selection.selection import explain_candidates, select_model
@@ -186,10 +192,13 @@ def _assembled(
 
     # Read once: images in blocks are in files.
     states = [graph.state for graph in graphs]
-    losses = evaluated(solve_attenuation)
+    losses = [value for graph in graphs if (value := graph.value_of(solve_attenuation)) is not None]
     spread = [graph.value_of(estimate_uncertainty) for graph in graphs]
     complete = all(item is not None for item in spread)
-    experimental = {} if losses is None else {"attenuation": EXPERIMENTAL}
+    held_out = np.sum([value.held_out for value in losses], axis=0)
+    experimental = {}
+    if losses:
+        experimental["attenuation"] = "; ".join(filter(None, (EXPERIMENTAL, held_out_amplitudes(held_out))))
     speed = image([1.0 / state.slowness for state in states])
     coverage = image([state.coverage for state in states])
     residuals, history = np.sum([state.residuals for state in states], axis=0), progress_of(graphs).history
@@ -198,6 +207,7 @@ def _assembled(
     cautions += fit_cautions(dataset, settings, residuals, history)
     if complete and any(item.caution for item in spread):
         cautions.append(Caution("uncertainty", _of_slices([item.caution for item in spread])))
+    cautions += attenuation_cautions(held_out) if losses else ()
     return Reconstruction(
         speed=speed,
         coverage=coverage,
@@ -206,7 +216,7 @@ def _assembled(
         water_speed_mps=water,
         settings=settings,
         history=history,
-        attenuation=losses,
+        attenuation=image([value.image for value in losses]) if losses else None,
         recovery=evaluated(check_resolution),
         uncertainty=image([item.deviation for item in spread]) if complete else None,
         resolution_width_m=tuple(item.width_m for item in spread) if complete else (),

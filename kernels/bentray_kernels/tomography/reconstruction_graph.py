@@ -6,14 +6,19 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
-from ..arrays import Floats, Ints
+import numpy as np
+
+from ..arrays import Flags, Floats, Ints
+from ..errors import InvalidInput
 from ..task_graph import ResumableGraph, Task
 from . import attenuation, resolution
+from .attenuation import Losses
 from .finite_frequency import width_in_nodes
 from .gauss_newton import gauss_newton_step
 from .gauss_newton.gauss_newton_step import Iterate
 from .gauss_newton.linearisation import Rows
 from .grid_schedule import initial_slowness
+from .problem import Problem
 from .result import Iteration, Progress
 from .sart.sart_step import State
 from .scan import Scan
@@ -51,7 +56,7 @@ class ReconstructionCheckpoint:
     passes_before: int
     history: tuple[Iteration, ...]
     state: State | Iterate
-    values: tuple[Floats | Uncertainty | None, ...]
+    values: tuple[Floats | Losses | Uncertainty | None, ...]
     spacing: float
     origin: tuple[float, ...]
 
@@ -137,7 +142,9 @@ class ReconstructionGraph:
         self._stage = self._stage_of(checkpoint.stage, checkpoint.state.slowness)
         self._stage.state = checkpoint.state
         for evaluation, value in zip(self._evaluations, checkpoint.values, strict=True):
-            evaluation.value = value
+            # Checkpoints of earlier versions hold the attenuation without its misfits: it is solved again.
+            earlier = evaluation.evaluate is solve_attenuation and not isinstance(value, Losses)
+            evaluation.value = None if earlier else value
 
     def first(self) -> list[Task]:
         """See ``task_graph.TaskGraph``."""
@@ -239,9 +246,26 @@ def trace_attenuation_rays(scan: Scan, index: int, slowness: Floats, batch: int)
     return attenuation.trace_rays(problem, scan.stages()[-1], slowness, emitters)
 
 
-def solve_attenuation(scan: Scan, index: int, _slowness: Floats, rows: list[Rows]) -> Floats:
-    """Task: the attenuation image."""
-    return attenuation.solve(scan.problem(index), scan.stages()[-1], rows)
+def solve_attenuation(scan: Scan, index: int, _slowness: Floats, rows: list[Rows]) -> Losses:
+    """Task: the attenuation image, and the misfits of held-out views."""
+    problem, settings = scan.problem(index), scan.stages()[-1]
+    image = attenuation.solve(problem, settings, rows)
+    parts = [_rays_of(scan._replace(part=part), index, problem) for part in ("shown", "views")]
+    # Behind a caustic pairs have no ray.
+    if not all(part.any() and part.size == sum(block.residual.size for block in rows) for part in parts):
+        return Losses(image, np.zeros(3))
+    return Losses(image, attenuation.validate(problem, settings, rows, *parts))
+
+
+def _rays_of(part: Scan, index: int, whole: Problem) -> Flags:
+    """(rays,), of all pairs with amplitudes: those of a part of the scan; empty without such a part."""
+    try:
+        ratio = part.problem(index).log_ratio
+    except InvalidInput:
+        ratio = None
+    if ratio is None or whole.log_ratio is None:
+        return np.empty(0, np.bool_)
+    return np.asarray(np.isfinite(ratio)[np.isfinite(whole.log_ratio)])
 
 
 def trace_final_rays(scan: Scan, index: int, slowness: Floats, batch: int) -> Rows:

@@ -28,6 +28,7 @@ SUBJECTS = {
     "constant": "no better than one constant speed",
     "noise": "times contradict each other",
     "uncertainty": "deviations may be too small",
+    "attenuation": "attenuation not better than a constant",
     "settings": "settings without effect",
 }
 
@@ -67,8 +68,8 @@ class Caution:
     Attributes:
         code: ``bounds``: the image is cut off by the speed bounds; ``residual``: it does not explain the
             times; ``constant``: it explains them no better than one speed; ``noise``: they contradict each
-            other; ``uncertainty``: the standard deviations may be too small; ``settings``: settings without
-            effect.
+            other; ``uncertainty``: the standard deviations may be too small; ``attenuation``: its image
+            predicts held-out amplitudes no better than a constant; ``settings``: settings without effect.
         text: one or two sentences for the reader, with the numbers and what to do.
         doubtful: whether the image itself is in doubt.
     """

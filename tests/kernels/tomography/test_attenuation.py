@@ -1,5 +1,6 @@
 """Attenuation: recovered from line integrals; gaps and water count; SART of it by hand, in its bounds."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,7 @@ from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Problem, Settings, reconstruct, rmse
-from bentray_kernels.tomography.attenuation import trace_rays
+from bentray_kernels.tomography.attenuation import trace_rays, validate
 from bentray_kernels.tomography.attenuation_sart import solve
 from bentray_kernels.tomography.focusing import focusing
 
@@ -184,6 +185,44 @@ def test_focusing_does_not_depend_on_emitter_batches(scan):
     near, far = np.array([12]), np.array([12, 36])
     alone, together = (trace_rays(problem, settings, slowness, emitters) for emitters in (near, far))
     assert np.array_equal(alone.residual, together.residual[: alone.residual.size])
+
+
+def test_an_image_that_predicts_amplitudes_no_better_than_a_constant_is_doubted(scan):
+    quick = plan("sart", rays="straight", iterations=1)
+    good = reconstruct(scan, quick)
+    said = re.search(r"; held-out amplitudes (\S+) dB against (\S+) dB$", good.provenance["attenuation"])
+    assert good.caution("attenuation") == ""
+    assert float(said[1]) < 0.5 * float(said[2])
+    noise = 1.0 + np.random.default_rng(0).standard_normal(scan.log_ratio_np.shape)
+    mixed = reconstruct(replace(scan, log_ratio_np=noise), quick)
+    worse = r"Attenuation not (clearly )?better than a constant: held-out amplitudes \S+ dB against \S+ dB\."
+    assert re.fullmatch(worse, mixed.caution("attenuation"))
+    # No amplitude of a view across the object.
+    near = reconstruct(
+        replace(scan, log_ratio_np=np.where(scan.distance_m() < RING.radius_m, noise, np.nan)), quick
+    )
+    assert "held-out" not in near.provenance["attenuation"]
+    assert near.caution("attenuation") == ""
+
+
+@pytest.mark.parametrize("solver", ["penalised", "sart"])
+def test_held_out_amplitudes_are_not_fitted(scan, solver):
+    settings = plan("sart", rays="straight", attenuation_solver=solver)
+    problem = Problem.from_dataset(replace(scan, water_attenuation_np_m=2.0), settings)
+    water = np.full(problem.region.shape, 1.0 / WATER)
+    blocks = [trace_rays(problem, settings, water, part) for part in np.split(np.arange(RING.elements), 4)]
+    # An attenuation of 7 Np/m more than that of the water, and held-out amplitudes 1 Np above it.
+    same = [replace(part, residual=part.project(7.0 * problem.spacing * problem.region)) for part in blocks]
+    held = np.arange(sum(part.residual.size for part in blocks)) % 5 == 0
+    ends = np.cumsum([part.residual.size for part in blocks])[:-1]
+    off = [
+        replace(part, residual=part.residual + more)
+        for part, more in zip(same, np.split(held, ends), strict=True)
+    ]
+    count, image, constant = validate(problem, settings, off, ~held, held)
+    assert count == held.sum()
+    assert constant == pytest.approx(count, rel=1e-4)
+    assert image == pytest.approx(count, rel=0.3)
 
 
 def test_a_pair_of_one_element_is_ignored(scan):

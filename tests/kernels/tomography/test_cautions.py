@@ -8,7 +8,7 @@ import pytest
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.noise import with_noise
 from bentray_kernels.tomography import Caution, Reconstruction, Settings, reconstruct
-from bentray_kernels.tomography.cautions import bound_cautions
+from bentray_kernels.tomography.cautions import attenuation_cautions, bound_cautions
 
 from ..straight_scans import DATA, chords_m, radar, ring_scan, trunk
 
@@ -117,6 +117,17 @@ def test_the_sentences_hold_the_numbers_and_what_to_do() -> None:
     text = image(scan, "sart", **settings).doubt
     assert "One constant speed of 148" in text
     assert "explains the times as well as the image" in text
+
+
+@pytest.mark.parametrize(("part", "less"), [(0.9, None), (0.96, "clearly "), (1.0, ""), (1.2, "")])
+def test_an_attenuation_must_be_clearly_better_than_a_constant(part: float, less: str | None) -> None:
+    """Of 50 pairs with a misfit of 0.1 Np, 0.869 dB, by the constant."""
+    held_out = np.array([50.0, 50.0 * (0.1 * part) ** 2, 50.0 * 0.1**2])
+    numbers = f"held-out amplitudes {0.868589 * part:.3g} dB against 0.869 dB."
+    text = f"Attenuation not {less}better than a constant: {numbers}"
+    expected = [] if less is None else [Caution("attenuation", text)]
+    assert [*attenuation_cautions(held_out)] == expected
+    assert not [*attenuation_cautions(np.zeros(3))]
 
 
 @pytest.mark.real

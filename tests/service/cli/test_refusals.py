@@ -77,7 +77,7 @@ CASES = (
     ("compare {result} {out}/none.npy", "No such file"),
     (f"{EXPORT}/image.tif", "a name ending in .h5, .hdf5, .npy"),
     ("export {out}/none.h5 -o {out}/image.nii", "no such file"),
-    (f"{EXPORT}/image.nii --quantity density", "one of speed, coverage, attenuation, recovery"),
+    (f"{EXPORT}/image.nii --quantity density", "one of speed, coverage, recovery"),
     (f"{EXPORT}/image.h5 --attenuation dB/cm/MHz", "Np/m, which HDF5 results hold"),
     ("export {result} -o {result}/reconstruction.h5 --force", "the same file"),
     ("geometry-field {truth} -o {out}/field", "PLY, OBJ"),

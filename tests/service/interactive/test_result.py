@@ -43,7 +43,7 @@ def test_arrays_have_places_and_units(result: Result) -> None:
     assert result.attributes["bentray"] == "0.1.0"
     assert result.trials[0].settings == {"rays": "straight", "relaxation": 0.03}
     assert repr(result).startswith(
-        "<bentray.Result of 12 x 12 nodes: speed, coverage, attenuation, recovery;"
+        "<bentray.Result of 12 x 12 nodes: speed, coverage, recovery, attenuation;"
     )
 
 

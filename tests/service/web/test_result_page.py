@@ -136,6 +136,19 @@ def test_the_attenuation_is_in_decibels_per_centimetre(page, result):
     )
 
 
+def test_an_attenuation_no_better_than_a_constant_is_last_and_grey_with_a_note_on_its_image(page, made):
+    text = "Attenuation not better than a constant: held-out amplitudes 2.6 dB against 2.5 dB."
+    ready(page, made(SPEED, cautions=(Caution("attenuation", text),), **MORE))
+    last = page.locator(".quantities button").last
+    expect(last).to_have_text("Attenuation (experimental)")
+    expect(last).to_have_attribute("title", text)
+    expect(page.locator(".quantities [data-grey]")).to_have_count(1)
+    expect(page.locator(".tile [role=note]")).to_have_count(0)
+    last.click()
+    expect(page.locator(".tile [role=note]")).to_have_text(text)
+    expect(page.locator(".tile [role=note]")).to_be_in_viewport(ratio=1.0)
+
+
 @pytest.mark.nightly
 def test_the_resolution_is_the_recovered_fraction(page, made):
     """With the same colours from nothing to all, whatever its values are."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels.acquisition import Truth
-from bentray_kernels.tomography import Candidate, Iteration, Reconstruction
+from bentray_kernels.tomography import Candidate, Caution, Iteration, Reconstruction
 from bentray_kernels.tomography.comparison import compare
 from bentray_kernels.tomography.model_selection.selection import explain_candidates
 from bentray_workers.images.report import report_png
@@ -36,7 +36,7 @@ RESIDUALS = "Residuals, 33.3 ns rms"
         ({"recovery": None}, ["Reconstruction", "Coverage", ATTENUATION, "Convergence", RESIDUALS]),
         (
             {},
-            ["Reconstruction", "Coverage", ATTENUATION, "Resolution check", "Convergence", RESIDUALS],
+            ["Reconstruction", "Coverage", "Resolution check", ATTENUATION, "Convergence", RESIDUALS],
         ),
     ],
 )
@@ -45,6 +45,14 @@ def test_report_without_a_truth(undrawn, change, shown):
     report_png(replace(result, **change))
     assert undrawn[-1].get_figwidth() > 7.0
     assert panels(undrawn) == shown
+
+
+def test_an_attenuation_no_better_than_a_constant_says_so_under_its_image(undrawn):
+    report_png(
+        replace(made(), cautions=(Caution("attenuation", "Not better."), Caution("bounds", "Cut off.")))
+    )
+    assert "x (mm)\nNot better." in undrawn.words()
+    assert "x (mm)\nCut off." not in undrawn.words()
 
 
 @pytest.mark.parametrize("change", [PLAIN, {}])

@@ -30,14 +30,14 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
     {
         "speed": Quantity("m/s", "speed_mps", "Sound speed", "sound speed (m/s)"),
         "coverage": Quantity("m", "coverage_m", "Coverage", "ray length per node (m)"),
-        "attenuation": Quantity(
-            "Np/m", "attenuation_np_m", "Attenuation (experimental)", "attenuation (Np/m)"
-        ),
         "recovery": Quantity("1", "recovery", "Resolution check", "recovered fraction of a checkerboard"),
         "uncertainty": Quantity(
             "m/s", "uncertainty_mps", "Uncertainty", "standard deviation of the speed (m/s)"
         ),
         "reflection": Quantity("dB", "reflection_db", "Reflection", "reflection (dB)"),
+        "attenuation": Quantity(
+            "Np/m", "attenuation_np_m", "Attenuation (experimental)", "attenuation (Np/m)"
+        ),
     }
 )
 REFLECTION = QUANTITIES["reflection"].array

@@ -46,15 +46,18 @@ GRIDS = {3: (1, 3), 4: (2, 2), 6: (2, 3), 8: (2, 4), 9: (3, 3), 12: (3, 4)}
 # Characters per inch of the line under the panels.
 CHARACTERS_AN_INCH = 15
 
+# Characters of a line under a panel.
+CAPTION = 55
+
 # Of the first line of a doubtful result.
 DOUBT = "#b00020"
 
 COLORMAPS = {
     "coverage": COVERAGE,
-    "attenuation": ATTENUATION,
     "recovery": RECOVERY,
     "uncertainty": UNCERTAINTY,
     "reflection": REFLECTION,
+    "attenuation": ATTENUATION,
 }
 
 
@@ -194,8 +197,11 @@ def _maps(panels: Iterator[Axes], result: Reconstruction, k: int) -> None:
         assert whole is not None
         image, grid = cut(whole.values, k), (whole.spacing_m, whole.origin_m)
         limits = usual_limits(name, image, None if name in FROM_ZERO else cut(result.coverage, k))
-        shown = draw_map(next(panels), image, *grid, limits, colormap=COLORMAPS[name], title=NAMES[name])
+        axes = next(panels)
+        shown = draw_map(axes, image, *grid, limits, colormap=COLORMAPS[name], title=NAMES[name])
         draw_bar([shown], LABELS[name])
+        if name == "attenuation" and (text := result.caution(name)):
+            axes.set_xlabel(f"x (mm)\n{textwrap.fill(text, CAPTION)}")
 
 
 def _curves(panels: Iterator[Axes], result: Reconstruction) -> None:

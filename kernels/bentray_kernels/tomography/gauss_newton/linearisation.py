@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from ...arrays import Floats, Ints
+from ...arrays import Flags, Floats, Ints
 from ...compilation.compiled import kernel
 from ...eikonal import solve
 from ...rays.bending import STRIDE, bend
@@ -74,6 +74,14 @@ class Rows:
         ends = np.concatenate(([0], np.cumsum(self.counts)))
         for first, last in itertools.pairwise(ends):
             yield self.between(first, last)
+
+    def chosen(self, rays: Flags) -> Rows:
+        """Copies of some rays, by their emitters."""
+        entries = np.diff(self.pointers)
+        counts = [part.sum() for part in np.split(rays, np.cumsum(self.counts)[:-1])]
+        kept = np.repeat(rays, entries)
+        ends = np.concatenate(([0], np.cumsum(entries[rays])))
+        return Rows(ends, self.columns[kept], self.lengths[kept], self.residual[rays], np.array(counts))
 
     def project(self, image: Floats) -> Floats:
         """A·image, (rays,): sums along the rays."""

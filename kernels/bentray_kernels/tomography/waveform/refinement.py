@@ -145,16 +145,19 @@ class Refinement:
             return None if values is None else stacked(_slices(rays, values))
 
         attenuation = of_rays(rays.attenuation)
+        # The bounds and the uncertainty of the rays do not belong to this image; it began with their misfit.
+        experimental: dict[str, str] = {}
+        others = {"bounds", "uncertainty"}
         losses = [image.attenuation + self._water_np_m for image in images if image.attenuation is not None]
         if len(losses) == len(images):
             pairs_of = zip(images, losses, strict=True)
             attenuation = stacked([replace(image, speed=loss) for image, loss in pairs_of])
-        experimental = {} if attenuation is None else {"attenuation": EXPERIMENTAL}
+            experimental["attenuation"] = EXPERIMENTAL
+            others.add("attenuation")
         speed, coverage = stacked(images), stacked(_slices(rays, rays.coverage))
         bounds = self._settings.speed_bounds_mps
         cautions = [*bound_cautions(speed, coverage, bounds, rays.water_speed_mps)]
-        # The bounds and the uncertainty of the rays do not belong to this image; it began with their misfit.
-        cautions += [caution for caution in rays.cautions if caution.code not in ("bounds", "uncertainty")]
+        cautions += [caution for caution in rays.cautions if caution.code not in others]
         return replace(
             rays,
             speed=speed,

@@ -61,7 +61,8 @@ class CautionRecord(BaseModel):
     code: str = Field(
         description="bounds: the image is cut off by the speed bounds; residual: it does not explain the "
         "times; constant: it explains them no better than one speed; noise: they contradict each other; "
-        "uncertainty: the standard deviations may be too small; settings: settings without effect."
+        "uncertainty: the standard deviations may be too small; attenuation: its image predicts held-out "
+        "amplitudes no better than a constant; settings: settings without effect."
     )
     text: str = Field(description="Sentences with the numbers and what to do.")
     doubtful: bool = Field(description="Whether the image itself is in doubt.")

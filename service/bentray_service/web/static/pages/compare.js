@@ -16,7 +16,7 @@ export async function open({ id, query }) {
   const dimensions = new Set(results.map(({ volume }) => volume.shape.length));
   if (dimensions.size > 1) throw new Error("An image and a volume cannot be compared");
   document.title = "Comparison – Bentray";
-  const panes = results.map(({ job, values, summary }, k) => ({ title: `${LETTERS[k]} ${job.title}`, values, stored: summary.quantities }));
+  const panes = results.map(({ job, values, summary, notes }, k) => ({ title: `${LETTERS[k]} ${job.title}`, values, notes, stored: summary.quantities }));
   const drawn = undrawn();
   return html`<div class="wide screen">
     <div class="head">

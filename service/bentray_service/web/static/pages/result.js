@@ -58,7 +58,7 @@ function Result({ result: first, query }) {
   const [drawn] = useState(undrawn);
   const [error, act] = useAct();
   const result = { ...first, job };
-  const { volume, summary, values } = result;
+  const { volume, summary, values, notes } = result;
   const width = summary.resolution_width_m[Math.floor(summary.resolution_width_m.length / 2)];
   const name = nameOf(result);
   useEffect(() => {
@@ -93,7 +93,7 @@ function Result({ result: first, query }) {
     </div>
     <${Alert} id="result-error" error=${error} />
     <${Onward} job=${job} summary=${summary} query=${query}>
-      <${Viewer} panes=${[{ title: name, values, stored: summary.quantities, detail: width && 1e3 * width }]} state=${state} keep=${keep} drawn=${drawn} id="result-viewer" aria-label="Image" />
+      <${Viewer} panes=${[{ title: name, values, notes, stored: summary.quantities, detail: width && 1e3 * width }]} state=${state} keep=${keep} drawn=${drawn} id="result-viewer" aria-label="Image" />
     </${Onward}>
   </div>
   <div class="wide">

@@ -4,7 +4,7 @@ import { request } from "./api.js";
 import { FoldedSection, HeadedTable, html, Pairs } from "./view.js";
 import { duration, inNanoseconds } from "./words.js";
 
-// { job, volume, summary, values } of a job.
+// { job, volume, summary, values, notes } of a job; notes: of quantities that are not to be trusted, by name.
 export async function loadResult(id) {
   const job = await request(`/v1/jobs/${id}`);
   if (job.kind !== "reconstruction" || job.state !== "succeeded") {
@@ -12,7 +12,8 @@ export async function loadResult(id) {
   }
   const volume = await request(job.links.volume);
   const summary = await request(`${volume.links.self}/summary`);
-  return { job, volume, summary, values: new Values(volume, summary.grids) };
+  const notes = Object.fromEntries(summary.cautions.filter(({ code }) => code === "attenuation").map(({ code, text }) => [code, text]));
+  return { job, volume, summary, values: new Values(volume, summary.grids), notes };
 }
 
 // What a reader calls it: its own name, else what was reconstructed how.

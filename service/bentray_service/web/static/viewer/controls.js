@@ -8,10 +8,10 @@ const MAPS = NAMES.map((name) => [name, name === "RdBu_r" ? "blue–red" : name]
 
 export const percent = (share) => `${Math.round(100 * share)} %`;
 
-// A row of buttons of which one is pressed. entries: [name, title].
-export function ChoiceBar({ label, className, entries, chosen, onChoose }) {
+// A row of buttons of which one is pressed. entries: [name, title]; notes: by name, why what a button shows is not to be trusted, which greys it.
+export function ChoiceBar({ label, className, entries, chosen, notes = {}, onChoose }) {
   return html`<div class=${`choice-bar ${className}`} role="group" aria-label=${label}>
-    ${entries.map(([name, title]) => html`<${Button} key=${name} data-name=${name} aria-pressed=${name === chosen} onClick=${() => onChoose(name)}>${title}</${Button}>`)}
+    ${entries.map(([name, title]) => html`<${Button} key=${name} data-name=${name} data-grey=${notes[name] && ""} title=${notes[name]} aria-pressed=${name === chosen} onClick=${() => onChoose(name)}>${title}</${Button}>`)}
   </div>`;
 }
 

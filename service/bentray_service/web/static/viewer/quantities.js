@@ -11,10 +11,6 @@ export const FADED = ["speed", "error"];
 
 export const QUANTITIES = {
   speed: { title: "Speed", words: "sound speed", unit: "m/s", map: "viridis", digits: 2, reads: ["speed"] },
-  attenuation: {
-    title: "Attenuation (experimental)", words: "attenuation, experimental", unit: "dB/cm", map: "cividis", digits: 4,
-    reads: ["attenuation"], factor: DB_CM_OF_NP_M,
-  },
   coverage: { title: "Coverage", words: "ray length per node", unit: "m", map: "magma", digits: 4, reads: ["coverage"], least: 0 },
   recovery: {
     title: "Resolution", words: "recovered fraction of a checkerboard", unit: "", map: "bone", digits: 3, reads: ["recovery"],
@@ -33,6 +29,10 @@ export const QUANTITIES = {
     symmetric: true,
   },
   truth: { title: "Truth", words: "true sound speed", unit: "m/s", map: "viridis", digits: 2, reads: ["truth"] },
+  attenuation: {
+    title: "Attenuation (experimental)", words: "attenuation, experimental", unit: "dB/cm", map: "cividis", digits: 4,
+    reads: ["attenuation"], factor: DB_CM_OF_NP_M,
+  },
 };
 
 // The map of a quantity above another one, which is grey: with no grey in it.

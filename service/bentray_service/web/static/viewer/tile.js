@@ -94,8 +94,8 @@ function actionsOf({ key, axis }, image, { main, state, window, change, setWindo
   };
 }
 
-// look: as for useImage; actions: see actionsOf.
-export function Tile({ tile, words, look, actions }) {
+// note: on the image; look: as for useImage; actions: see actionsOf.
+export function Tile({ tile, words, note, look, actions }) {
   const [canvas, image, marks] = useImage(look);
   const pressed = useRef(null);
   const { state } = actions;
@@ -129,6 +129,7 @@ export function Tile({ tile, words, look, actions }) {
     <canvas ref=${canvas} class=${grip ? "plane grip" : "plane"} tabindex="0" role="application" aria-roledescription="image" aria-label=${label}
       ...${image && { onKeyDown: keyHandler((event) => act().keys(event)), onWheel, ...pointers }}></canvas>
     ${marks}
+    ${note && html`<p class="on-image" role="note">${note}</p>`}
     ${tile.title && html`<figcaption>${tile.title}</figcaption>`}
   </figure>`;
 }

@@ -197,16 +197,17 @@ function Body({ read, panes, state, change, drawn }) {
   const inUnit = ({ words, unit }) => `${words}${unit ? ` (${unit})` : ""}`;
   const bars = [{ low, high, map, words: `${comparing ? "difference of " : ""}${inUnit(quantity)}` }];
   if (over) bars.push({ low: overLow, high: overHigh, map: overMap, words: inUnit(over) });
+  const noteOf = ({ number: pane }) => panes[pane].notes[read.quantity] ?? panes[pane].notes[read.over];
   // What a figure shows, once it is wanted: see figure.js.
   drawn.current = () => {
     const canvases = images.current.querySelectorAll("canvas.plane");
     const panels = tiles.map((tile, k) => ({ title: tile.title, look: lookOf(tile), size: [canvases[k].clientWidth, canvases[k].clientHeight] }));
-    return { panels, bars, words: viewInWords(state, bars, main, panels[0].look) };
+    return { panels, bars, words: [viewInWords(state, bars, main, panels[0].look), ...new Set(tiles.map(noteOf))].filter(Boolean).join(". ") };
   };
   return html`<div class="viewer-body">
     <div class="viewer-images">
       <div class="tiles" data-count=${tiles.length} ref=${images}>
-        ${tiles.map((tile) => html`<${Tile} key=${tile.key} tile=${tile} words=${over ? `${quantity.words} with ${over.words} above` : quantity.words} look=${lookOf(tile)} actions=${actions} />`)}
+        ${tiles.map((tile) => html`<${Tile} key=${tile.key} tile=${tile} words=${over ? `${quantity.words} with ${over.words} above` : quantity.words} note=${noteOf(tile)} look=${lookOf(tile)} actions=${actions} />`)}
       </div>
       ${state.mode === "swipe" && panes.length > 1 && html`<${Swipe} panes=${panes} other=${state.other} swipe=${state.swipe} change=${change} />`}
       <${Slices} main=${main} axes=${axes} axis=${main.axes.length > 1 && !state.planes ? state.axis : null} cursor=${cursor}
@@ -231,7 +232,7 @@ function Body({ read, panes, state, change, drawn }) {
   </div>`;
 }
 
-// panes: [{ title, values, stored, detail }], with Values, the names of the stored quantities, and the resolution width, mm, if it is known. state: of the view, which is changed in place;
+// panes: [{ title, values, stored, notes, detail }], with Values, the names of the stored quantities, notes as for ChoiceBar, and the resolution width, mm, if it is known. state: of the view, which is changed in place;
 // keep(query): called when the view changes; drawn: { current }, which becomes a function that gives what figureOf draws.
 export function Viewer({ panes, state, keep, drawn, ...more }) {
   // The quantities that all panes have.
@@ -253,6 +254,7 @@ export function Viewer({ panes, state, keep, drawn, ...more }) {
   return html`<section class="image-viewer" aria-busy=${words ? "true" : undefined} ...${more}>
     <div class="viewer-bar">
       <${ChoiceBar} label="Quantity" className="quantities" entries=${names.map((name) => [name, QUANTITIES[name].title])} chosen=${state.quantity}
+        notes=${Object.assign({}, ...panes.map(({ notes }) => notes))}
         onChoose=${(name) => change({ quantity: name, window: null, map: null })} />
       ${panes.length > 1 && html`<${ChoiceBar} label="Comparison" className="comparison-modes" entries=${Object.entries(MODES)} chosen=${state.mode}
         onChoose=${(mode) => change({ mode, window: null, map: null })} />`}
