@@ -94,7 +94,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         volume = stored_volume(http, QUICK_NODES if context.quick else NODES)
         mesh, picture = stored_field(http, context.quick)
         sets = (
-            (VOLUMES, str(volume["links"]["refraction"]), f"{url}/#/rendering/{volume['id']}"),
+            (VOLUMES, str(volume["links"]["refraction"]), f"{url}/#/rendering/{volume['id']}?view=surface"),
             (SURFACES, picture, f"{url}/#/surfaces/{mesh}"),
         )
         for modes, address, _ in sets:

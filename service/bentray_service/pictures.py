@@ -64,7 +64,7 @@ log = logging.getLogger("bentray.pictures")
 
 Found = TypeVar("Found")
 # What is drawn or exported.
-Input = DatasetRow | VolumeRow | FieldRow
+Input = DatasetRow | VolumeRow | FieldRow | MeshRow
 
 
 class Pictures:
@@ -95,7 +95,7 @@ class Pictures:
         """Allow ``examine``, in the event loop that uses this object."""
         self._loop = asyncio.get_running_loop()
 
-    def examine(self, dataset: Input | MeshRow) -> None:
+    def examine(self, dataset: Input) -> None:
         """Make the quality report of a new dataset that takes long, from any thread; one at a time."""
         if self._loop is None or not isinstance(dataset, DatasetRow):
             return
@@ -150,10 +150,11 @@ class Pictures:
                 del self._histograms[next(iter(self._histograms))]
         return self._histograms[key]
 
-    async def field_png(self, field: FieldRow, view: FieldView) -> bytes:
-        """Render a scene with a geometry field."""
-        cost = picture_cost.field_cost(field.figures, view)
-        return bytes(await self._made(field, cost, "field", lambda here: field_picture.tasks_of(here, view)))
+    async def mesh_png(self, mesh: FieldRow | MeshRow, view: FieldView) -> bytes:
+        """Render a scene with a geometry field, or with a mesh that needs none."""
+        figures = mesh.figures if isinstance(mesh, FieldRow) else {"faces": mesh.faces}
+        cost, (kind, _) = picture_cost.field_cost(figures, view), _named(mesh)
+        return bytes(await self._made(mesh, cost, kind, lambda here: field_picture.tasks_of(here, view)))
 
     async def field_map_png(self, field: FieldRow, which: str) -> bytes:
         """Render the geometry image of a field, see ``bentray_workers.rendering.field_picture.map_png``."""
@@ -334,7 +335,9 @@ def _named(item: Input) -> tuple[str, str]:
     """Field and value of an item in a refusal."""
     if isinstance(item, DatasetRow):
         return "dataset", item.id
-    return ("field", item.id) if isinstance(item, FieldRow) else ("volume", f"shape {tuple(item.shape)}")
+    if isinstance(item, VolumeRow):
+        return "volume", f"shape {tuple(item.shape)}"
+    return ("field" if isinstance(item, FieldRow) else "mesh"), item.id
 
 
 def _water(dataset: DatasetRow) -> dict[str, float]:

@@ -26,7 +26,7 @@ from .rows.database import Database
 from .rows.ids import Tenant
 from .rows.jobs import Jobs, Submission
 from .rows.stored_tables import GeometryFields
-from .rows.tables import DatasetRow, FieldRow, VolumeRow
+from .rows.tables import DatasetRow, FieldRow, MeshRow, VolumeRow
 from .settings import ServiceSettings
 from .webhooks.sender import Webhooks
 
@@ -94,6 +94,10 @@ class RequestContext:
     async def volume(self, volume_id: str) -> VolumeRow:
         """Find the volume that a path names."""
         return await run_in_threadpool(self.stores.volumes.get, self.tenant, volume_id)
+
+    async def mesh(self, mesh_id: str) -> MeshRow:
+        """Find the mesh that a path names."""
+        return await run_in_threadpool(self.stores.meshes.get, self.tenant, mesh_id)
 
     async def field(self, field_id: str) -> FieldRow:
         """Find the geometry field that a path names."""

@@ -51,7 +51,8 @@ def places(start: Callable[..., Any], uploaded: Callable[[Any], str]) -> tuple[A
     http = start()
     content = npy(np.arange(60, dtype=np.uint8).reshape(3, 4, 5))
     volume = http.post("/v1/volumes", content=content, headers=STREAM).json()["id"]
-    return http, {"dataset_id": uploaded(http), "volume_id": volume, "field_id": new_id("field")}
+    unknown = {f"{kind}_id": new_id(kind) for kind in ("mesh", "field")}
+    return http, {"dataset_id": uploaded(http), "volume_id": volume, **unknown}
 
 
 def test_every_parameter_is_refused_outside_its_description(places, cluster) -> None:

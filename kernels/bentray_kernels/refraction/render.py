@@ -15,6 +15,7 @@ from .camera import Camera
 from .caster import LOST, allocate_results, cast, medium_of
 from .caster_opencl import OpenCLCaster
 from .coarse_rays import Hits, interpolate_rays
+from .edge_smoothing import smooth_edges
 from .scene import Scene
 from .supersampling import averaged, point_colours, post_refraction_colours
 
@@ -34,6 +35,8 @@ class RenderSettings:
             backdrop's colour beyond all planes.
         supersampling: "none"; "prss", after refraction (4.3.3); "real", more rays.
         degree: for "prss" as in ``post_refraction_colours``; for "real" rays a pixel along each axis.
+        smooth_edges: whether rays that met another number of interfaces than a neighbour, or ended on another
+            plane, get a mean of colours, see ``edge_smoothing``.
         fresnel: whether light is attenuated by reflection at each interface.
         structure, roots, step: as in ``Scene.search``.
         ray_spacing: pixels between rays along both sides, for a preview: where rays end is interpolated
@@ -50,6 +53,7 @@ class RenderSettings:
     depth: int = 16
     supersampling: str = "prss"
     degree: int = 1
+    smooth_edges: bool = False
     fresnel: bool = False
     structure: str = "octree"
     roots: str = "certain"
@@ -145,6 +149,8 @@ def render(
         post_refraction_colours(backdrop, lit, settings.degree, image)
     else:
         point_colours(backdrop, lit, image)
+    if settings.smooth_edges:
+        smooth_edges(np.stack([hits.crossed, hits.plane.astype(np.int16)], axis=2), 1, image)
     # Where there is no plane, any edge leaves NaN what it is.
     position = hits.where * backdrop.edges[hits.plane]
     image = image if times == 1 else averaged(image, times)

@@ -25,6 +25,9 @@ RayGradient = Literal["differences", "bspline"]
 PickerName = Literal["aic", "threshold", "energy-ratio", "sta-lta", "correlation", "matched"]
 DEFAULT_PICKER: PickerName = "aic"
 
+# The axis of an object that is up in a picture.
+UpAxis = Literal["auto", "z", "y", "x", "-z", "-y", "-x"]
+
 # Where a user wants engines to compute.
 DeviceRequest = Literal["auto", "cpu", "opencl"]
 REQUESTS: tuple[str, ...] = get_args(DeviceRequest)

@@ -36,7 +36,7 @@ def geometry_field(
     Writes image.png, geometry-image.png, normal-map.png, geometry-field.json and the field. An existing field
     is reused; an interrupted one is continued.
 
-    Example:  bentray geometry-field bunny.ply -o bunny --mode refract --up y
+    Example:  bentray geometry-field bunny.ply -o bunny --mode refract
     """
     source, folder = input_file(mesh, ACCEPTED), output_folder(output)
     settings, view = field_of(options)

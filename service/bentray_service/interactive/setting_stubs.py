@@ -16,7 +16,7 @@ HEAD = '''"""The settings of jobs as types, for editors and type checkers; writt
 
 from typing import Literal, TypedDict
 
-from bentray_kernels.requests.names import DeviceRequest, PickerName, SolverName
+from bentray_kernels.requests.names import DeviceRequest, PickerName, SolverName, UpAxis
 '''
 
 

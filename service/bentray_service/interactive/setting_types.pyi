@@ -2,7 +2,7 @@
 
 from typing import Literal, TypedDict
 
-from bentray_kernels.requests.names import DeviceRequest, PickerName, SolverName
+from bentray_kernels.requests.names import DeviceRequest, PickerName, SolverName, UpAxis
 
 Method = Literal["sart", "gauss-newton", "auto", "waveform"]
 PhantomName = Literal["table6", "table6-vertical", "detailed", "breast", "table7"]
@@ -58,6 +58,7 @@ class RefractionSettings(TypedDict, total=False):
     azimuth_deg: float
     elevation_deg: float
     zoom: float
+    up: UpAxis
     backdrop: Literal["checkerboard", "picture", "warped-checkerboard", "warped-picture"]
     squares: int
     backdrop_distance: float

@@ -37,7 +37,7 @@ async def image_png(field_id: str, context: Context, view: FieldViewParameters) 
     """
     field = await context.field(field_id)
     view.check_samples(field.settings["samples"])
-    draw = partial(context.background.pictures.field_png, field, view)
+    draw = partial(context.background.pictures.mesh_png, field, view)
     return await picture(context, field, view.plain(), draw)
 
 

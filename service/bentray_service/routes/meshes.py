@@ -1,6 +1,7 @@
 """/v1/meshes: upload, list and delete triangle meshes; iso-surfaces of volumes."""
 
 import math
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -18,7 +19,7 @@ from ..web.errors import problems
 from ..wiring import Context
 from .bodies import Limit, accept_upload
 from .models.surface_records import MeshList, MeshRecord
-from .pictures import while_connected
+from .pictures import PICTURE, MeshViewParameters, picture, while_connected
 from .record_conversion import mesh_record
 from .uploads.one_shot_uploads import body_of, receive_upload
 
@@ -62,6 +63,19 @@ def list_meshes(context: Context, limit: Limit = 100) -> MeshList:
 def show_mesh(mesh_id: str, context: Context) -> MeshRecord:
     """Show one mesh: size, genus, holes and repairs."""
     return mesh_record(context.stores.meshes.get(context.tenant, mesh_id))
+
+
+@router.head("/meshes/{mesh_id}/image.png", include_in_schema=False)
+@router.get("/meshes/{mesh_id}/image.png", response_class=Response, responses=PICTURE)
+async def mesh_png(mesh_id: str, context: Context, view: MeshViewParameters) -> Response:
+    """Render a scene with the mesh as mirror, glass or clay, by exact intersection, without a field.
+
+    Images of its geometry field are faster and have the colours of the vertices. HEAD returns the ETag
+    without rendering, so Content-Length is absent.
+    """
+    mesh = await context.mesh(mesh_id)
+    draw = partial(context.background.pictures.mesh_png, mesh, view)
+    return await picture(context, mesh, view.plain(), draw)
 
 
 @router.delete("/meshes/{mesh_id}", status_code=status.HTTP_204_NO_CONTENT, responses=problems(404, 409, 503))

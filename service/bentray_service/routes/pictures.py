@@ -4,7 +4,7 @@ import asyncio
 import hashlib
 import inspect
 import math
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import fields
 from typing import Annotated, Any, TypeVar, get_type_hints
 
@@ -105,33 +105,35 @@ async def _left(request: Request) -> None:
         """The empty body of the request."""
 
 
-def view_dependency(kind: type[View]) -> Callable[..., View]:
+def view_dependency(kind: type[View], **fixed: Any) -> Callable[..., View]:
     """A dependency that builds a view from the query.
 
     It raises InvalidInput for parameters that are unknown or have no effect beside the others.
 
     Args:
         kind: a dataclass whose fields have a ``description`` in their metadata.
+        fixed: values of fields that are no parameters.
     """
-    names = [field.name for field in fields(kind)]  # type: ignore[arg-type]
+    names = [field.name for field in fields(kind) if field.name not in fixed]  # type: ignore[arg-type]
 
     def view_of(request: Request, **values: Any) -> View:
         for name in request.query_params:
             if name not in names:
                 raise InvalidInput(name, repr(request.query_params[name])[:80], "one of " + ", ".join(names))
-        view = kind(**{name: tuple(v) if isinstance(v, list) else v for name, v in values.items()})
+        given = {name: tuple(v) if isinstance(v, list) else v for name, v in values.items()}
+        view = kind(**given, **fixed)
         checked: View = check_used(view)
         return checked
 
-    view_of.__signature__ = _signature(kind)  # type: ignore[attr-defined]
+    view_of.__signature__ = _signature(kind, names)  # type: ignore[attr-defined]
     return view_of
 
 
-def _signature(kind: type[Any]) -> inspect.Signature:
-    """The signature for FastAPI: the fields of the view with their descriptions."""
+def _signature(kind: type[Any], names: Sequence[str]) -> inspect.Signature:
+    """The signature for FastAPI: the named fields of the view with their descriptions."""
     types = get_type_hints(kind)
     parameters = [inspect.Parameter("request", inspect.Parameter.KEYWORD_ONLY, annotation=Request)]
-    for field in fields(kind):
+    for field in (field for field in fields(kind) if field.name in names):
         default: Any = field.default
         several = isinstance(default, tuple)
         annotation: Any = list[float] if several else types[field.name]
@@ -152,3 +154,5 @@ def _signature(kind: type[Any]) -> inspect.Signature:
 
 ViewParameters = Annotated[RefractionView, Depends(view_dependency(RefractionView))]
 FieldViewParameters = Annotated[FieldView, Depends(view_dependency(FieldView))]
+# Without a field all rays are exact.
+MeshViewParameters = Annotated[FieldView, Depends(view_dependency(FieldView, lookup="exact", eye="exact"))]

@@ -149,7 +149,8 @@ def volume_record(row: VolumeRow) -> VolumeRecord:
 
 
 def mesh_record(row: MeshRow) -> MeshRecord:
-    links = {"self": f"/v1/meshes/{row.id}"}
+    here = f"/v1/meshes/{row.id}"
+    links = {"self": here, "image": f"{here}/image.png"}
     if row.volume_id is not None:
         links["volume"] = f"/v1/volumes/{row.volume_id}"
     return record_of(MeshRecord, row, volume=row.volume_id, closed=row.holes == 0, links=links)

@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 
 from bentray_kernels.meshes.example_surfaces import bumpy_ball, torus
 from bentray_kernels.meshes.mesh import TriangleMesh
@@ -53,6 +54,19 @@ def test_every_format(http, kind):
     assert [one["id"] for one in http.get("/v1/meshes").json()["meshes"]] == [made["id"]]
     stored = load_mesh(http.app.state.stores.files.of(LOCAL).mesh(made["id"])).mesh
     assert stored.faces.shape == (192, 3)
+
+
+def test_a_mesh_is_drawn_without_a_field(http):
+    made = send(http, off(RING)).json()
+    views = [{"mode": mode, "width": 24, "height": 20} for mode in ("diffuse", "refract")]
+    answers = [http.get(made["links"]["image"], params=view) for view in views]
+    assert [answer.headers["content-type"] for answer in answers] == ["image/png"] * 2
+    assert answers[0].content != answers[1].content
+    assert Image.open(io.BytesIO(answers[0].content)).size == (24, 20)
+    tags = {http.head(made["links"]["image"], params={**views[0], "up": up}).headers["etag"] for up in "xyz"}
+    assert len(tags) == 3
+    refused(http.get(made["links"]["image"], params={"lookup": "nearest"}), "lookup")
+    refused(http.get(f"/v1/meshes/{new_id('mesh')}/image.png"), "mesh", status=404)
 
 
 def test_repairs_are_reported(http):

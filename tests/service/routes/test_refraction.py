@@ -63,6 +63,7 @@ def test_every_parameter_changes_the_picture_or_its_tag(http):
         "zoom": 2,
         "squares": 5,
         "backdrop_distance": 2,
+        "up": "x",
         "width": 31,
         "height": 31,
         "device": "cpu",

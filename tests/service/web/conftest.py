@@ -86,9 +86,9 @@ DROP = """([selector, files]) => {
 }"""
 
 
-def drop(page: Any, selector: str, **files: bytes) -> None:
-    """Drop files on an element, as if from the desktop: the contents of HDF5 files by their names."""
-    contents = [[f"{name}.h5", base64.b64encode(content).decode()] for name, content in files.items()]
+def drop(page: Any, selector: str, suffix: str = ".h5", **files: bytes) -> None:
+    """Drop files on an element, as if from the desktop: contents by their names without suffix."""
+    contents = [[f"{name}{suffix}", base64.b64encode(content).decode()] for name, content in files.items()]
     page.evaluate(DROP, [selector, contents])
 
 

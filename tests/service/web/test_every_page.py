@@ -58,6 +58,7 @@ def places(shared_service):
         f"/compare/{','.join(plane)}?{marks}": "m/s · B",
         f"/compare/{','.join(plane)}?mode=swipe": "m/s · B",
         "/jobs": "Sixteen elements",
+        f"/rendering/{ball['id']}": "node ",
         f"/rendering/{ball['id']}?mode=refract": "azimuth",
         "/surfaces": "Surface rendering",
         "/service": "worker",

@@ -83,8 +83,8 @@ def test_its_pictures_are_those_of_the_service(page, address, name):
     page.goto(address)
     page.evaluate(LOAD, {"links": volume["links"], "spacing": volume["spacing_m"], "filter": chosen})
     views = [
-        {"mode": "refract", "azimuth_deg": 120, "elevation_deg": -35, "zoom": 1.4},
-        {"mode": "shaded", "azimuth_deg": 30, "elevation_deg": 20, "zoom": 1},
+        {"mode": "refract", "azimuth_deg": 120, "elevation_deg": -35, "zoom": 1.4, "up": "-y"},
+        {"mode": "shaded", "azimuth_deg": 30, "elevation_deg": 20, "zoom": 1, "up": "x"},
     ]
     for view in views:
         here = page.evaluate(DRAW, {**view, **surfaces, **SIZE})
@@ -117,6 +117,7 @@ def moved(page, address, tmp_path):
     page.goto(address + "/#/rendering")
     page.set_input_files("#volume-file", tmp_path / "ball.npy")
     page.get_by_text("ball.npy is stored").wait_for()
+    page.get_by_role("button", name="Surface", exact=True).click()
     page.locator("#glass[data-quality=full]").wait_for()
     page.get_by_role("img", name="Histogram").wait_for()
     page.locator("#stage").focus()

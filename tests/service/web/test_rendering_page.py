@@ -37,9 +37,9 @@ def settings_of(address):
 
 @pytest.fixture(scope="module")
 def stored(shared_service):
-    """The address of the view of a ball with a hole."""
+    """The address of the surface of a ball with a hole."""
     volume = stored_volume(shared_service.address, sampled(ONE_HOLE, 12))
-    return f"{shared_service.address}/#/rendering/{volume['id']}"
+    return f"{shared_service.address}/#/rendering/{volume['id']}?view=surface"
 
 
 @pytest.fixture
@@ -56,7 +56,14 @@ def test_a_volume_is_uploaded_looked_at_and_turned(page, serve, work, tmp_path, 
     page.set_input_files("#volume-file", saved(tmp_path, sampled(ONE_HOLE, 12)))
     page.get_by_text("ball.npy is stored").wait_for()
     page.get_by_text(re.compile("^12 . 12 . 12 nodes")).wait_for()
-    # What is it? A lit surface comes first, glass second.
+    # What is it? Three planes of its values come first, a lit surface second, glass third.
+    expect(page.locator("canvas.plane")).to_have_count(3)
+    expect(page.locator(".readout")).to_contain_text("node 6, 6, 6")
+    value = float(page.locator(".readout").get_attribute("data-value"))
+    assert value == pytest.approx(float(sampled(ONE_HOLE, 12)[6, 6, 6]), rel=1e-6)
+    page.wait_for_url(re.compile("view=planes"))
+    expect(page.get_by_label("Iso-value", exact=True)).to_be_hidden()
+    page.get_by_role("button", name="Surface", exact=True).click()
     image = page.get_by_role("img", name="Volume rendering of ball.npy")
     expect(image).to_have_attribute("data-address", re.compile("mode=shaded.*&width=512&height=512"))
     page.get_by_label("Glass").check()
@@ -204,6 +211,7 @@ def test_an_iso_value_is_chosen_by_its_histogram(page, address, tmp_path):
     values = np.round(200.0 * sampled(ONE_HOLE, 14)).astype(np.uint8)
     page.goto(address + "/#/rendering")
     page.set_input_files("#volume-file", saved(tmp_path, values))
+    page.get_by_role("button", name="Surface", exact=True).click()
     histogram = page.get_by_role("img", name=re.compile(r"^Histogram of 2,744 nodes from 0 to 200"))
     histogram.wait_for()
     steps = histogram.locator("path").get_attribute("d").split("V")[1:-1]

@@ -243,9 +243,7 @@ def test_the_numbers_of_the_page_are_those_of_the_service(page, traced):
     loads = [{"waiting_images": 1, "images_s": 3.2}, {"waiting_images": 0, "images_s": None}]
     page.route("**/v1/cluster", lambda route: route.fulfill(json=busy(**loads[0])))
     page.get_by_text("Matrix and histogram of the travel times").click()
-    page.get_by_text(
-        "Drawing the report · waiting for a worker: 2 of 2 busy, about 4 s"
-    ).wait_for()
+    page.get_by_text("Drawing the report · waiting for a worker: 2 of 2 busy, about 4 s").wait_for()
     del loads[0]
     page.get_by_text("Drawing the report · a worker computes it", exact=True).wait_for()
     held[0].continue_()

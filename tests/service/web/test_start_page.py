@@ -1,10 +1,16 @@
 """The start page: upload a scan, error messages, and the list of scans."""
 
+import io
+
 import httpx
+import numpy as np
 import pytest
+import trimesh
 from playwright.sync_api import expect
 from scipy.io import savemat
 
+from bentray_kernels.meshes.example_surfaces import torus
+from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_workers.simulation.request import SAMPLE, PhantomScan
 
 from ...workers.foreign_scans.scans import delta_tof, positions
@@ -22,7 +28,9 @@ def test_several_files_are_dropped_beside_the_zone(page, serve, scan, tmp_path):
     content = scan().read_bytes()
     drop(page, "h1", first=content, notes=b"only text", second=content)
     page.get_by_text("3 of 3: second.h5 is stored").wait_for()
-    expect(page.locator("#scan-error")).to_contain_text("notes.h5 is not a scan that can be read. ")
+    expect(page.locator("#scan-error")).to_contain_text(
+        "notes.h5 is not a scan, a volume or a mesh that can be read. "
+    )
     expect(page.locator("#scans li")).to_have_count(2)
 
 
@@ -57,11 +65,30 @@ def test_errors_are_shown_as_text(page, address, tmp_path):
     alert = page.locator("#scan-error")
     found = "Found a file that is not HDF5 (it begins with 'only tex'); accepted: a scan in HDF5, MATLAB "
     found += "or NumPy (.npz), or a zip or folder of a documented format."
-    expect(alert).to_contain_text(f"notes.h5 is not a scan that can be read. {found}")
+    expect(alert).to_contain_text(f"notes.h5 is not a scan, a volume or a mesh that can be read. {found}")
     alert.get_by_role("link", name="Accepted formats").click()
     page.get_by_role("heading", name="Scans", exact=True).wait_for()
     assert page.url.endswith("/docs/formats#scans")
     page.get_by_role("heading", name="openUSCT (HDF5)").wait_for()
+
+
+def test_a_volume_and_a_mesh_open_on_their_own_pages(page, address, tmp_path):
+    content = io.BytesIO()
+    np.savez(content, volume=np.round(200.0 * sampled(ONE_HOLE, 12)).astype(np.uint8))
+    page.goto(address)
+    page.locator("#scan-drop").wait_for()
+    # By its content: the service refuses it as a scan first.
+    drop(page, "#scan-drop", ball=content.getvalue(), suffix=".npz")
+    page.locator(".readout").wait_for()
+    assert "#/rendering/vol-" in page.url
+    page.locator("#volume-drop").wait_for()
+    ring = torus(12, 8)
+    mesh = trimesh.Trimesh(ring.vertices, ring.faces, process=False).export(file_type="ply")
+    drop(page, "#volume-drop", ring=mesh, suffix="")
+    page.get_by_text("192 faces").wait_for()
+    assert "#/surfaces/mesh-" in page.url
+    drop(page, "#mesh-drop", ring=mesh[:200], suffix=".ply")
+    expect(page.locator("#mesh-error")).to_contain_text("ring.ply is not a mesh that can be read. ")
 
 
 @pytest.mark.nightly

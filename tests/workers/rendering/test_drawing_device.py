@@ -23,7 +23,8 @@ from bentray_workers.rendering.turntable import Turntable, draw_turntable
 from ..pixels import pixels_of
 from .field_folders import field_of
 
-GLASS = RefractionView(iso=(0.5,), width=96, height=64)
+# A ray that takes another path on the device shows in the pixels around, too, where edges are smoothed.
+GLASS = RefractionView(iso=(0.5,), supersampling="none", width=96, height=64)
 MIRROR = FieldView(width=64, height=48, mode="refract")
 
 # Share of pixels that may differ by more than one level of 255: rays in float32, and in float64.

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bentray_kernels.phantoms import ONE_HOLE, FringeSphere, sampled
+from bentray_kernels.refraction import RenderSettings
 from bentray_workers.files.volume import Volume, write_volume
 from bentray_workers.images.backdrop_card import backdrop_card
 from bentray_workers.rendering import refraction
@@ -20,6 +21,7 @@ from bentray_workers.rendering.tiles import TASK_RAYS, stack_png, tile_rows
 
 from ..pixels import pixels_of
 
+NOISY = {"smooth_edges": False}
 SMALL = RefractionView(iso=(0.5,), width=48, height=32)
 
 
@@ -96,7 +98,7 @@ def test_rays_that_meet_more_surfaces_than_allowed_show_dark_grey(path):
 
 
 def test_the_frame_is_right_handed_with_z_up():
-    ahead, right, down = frame_of(RefractionView(azimuth_deg=0.0, elevation_deg=0.0))
+    ahead, right, down = frame_of(RefractionView(azimuth_deg=0.0, elevation_deg=0.0, up="z"))
     np.testing.assert_allclose(ahead, [-1.0, 0.0, 0.0], atol=1e-15)
     np.testing.assert_allclose(right, [0.0, 1.0, 0.0], atol=1e-15)
     np.testing.assert_allclose(down, [0.0, 0.0, -1.0], atol=1e-15)
@@ -132,6 +134,20 @@ def test_real_supersampling_smooths(path):
     assert edges > len(
         np.unique(whole(path, replace(lit, supersampling="none")).image.reshape(-1, 3), axis=0)
     )
+
+
+def test_edges_of_glass_are_smoothed(path, monkeypatch):
+    view = replace(SMALL, width=96, height=64)
+    smooth, flat = (whole(path, replace(view, index=(n,))).image.astype(int) for n in (1.5, 1.0))
+    monkeypatch.setattr(refraction, "RenderSettings", lambda **how: RenderSettings(**how | NOISY))
+    noisy, fine = (
+        whole(path, replace(view, supersampling=name, degree=n)).image.astype(int)
+        for name, n in (("prss", 1), ("real", 8))
+    )
+    before, after = (np.sqrt(np.mean((image - fine) ** 2)) for image in (noisy, smooth))
+    assert after < 0.8 * before
+    # Where all rays take the same path nothing is smoothed.
+    np.testing.assert_array_equal(whole(path, replace(view, index=(1.0,))).image[:8], flat[:8])
 
 
 def test_a_picture_of_ones_own(path):

@@ -133,7 +133,7 @@ def warm_up_tracing() -> None:
     points, starts = spread_points(surface, 2)
     outer = outer_field(4, [build_rows(surface, 4, 0, 96)])
     inner = inner_field(4, starts, [build_inner_rows(surface, 4, points)])
-    view = FieldView(scene="mirror-ball", width=4, height=4)
+    view = FieldView(scene="mirror-ball", up="z", width=4, height=4)
     scene = scene_of(Shape(surface, outer, inner), None, view)
     trace(world_of(scene), camera_of(view), TraceSettings(view.height, view.width))
 

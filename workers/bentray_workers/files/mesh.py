@@ -88,6 +88,13 @@ def write_mesh(path: Path, stored: StoredMesh) -> None:
         write_packed(file, arrays)
 
 
+def stored_faces(path: Path) -> int:
+    """Number of faces of a mesh, without reading them."""
+    with opened(path) as reader:
+        faces = reader.checked("faces", "i", "(faces, 3) rows of the vertices")
+        return 0 if faces is None else int(faces.shape[0])
+
+
 def load_mesh(path: Path) -> StoredMesh:
     """Read a mesh.
 

@@ -1,4 +1,4 @@
-"""Cache of geometry fields: surfaces and scenes made once per process, memory-mapped tables."""
+"""Cache of meshes and geometry fields: surfaces and scenes made once per process, memory-mapped tables."""
 
 import math
 from dataclasses import replace
@@ -14,13 +14,17 @@ from bentray_kernels.geometry_field.tables.outer_field import OuterField
 from bentray_kernels.geometry_field.tables.reference_field import ReferenceField, reference_field
 from bentray_kernels.geometry_field.tracing.packed_scene import World, moved, world_of
 from bentray_kernels.geometry_field.tracing.scene import Shape
+from bentray_kernels.meshes.mesh import Chart
 from bentray_kernels.meshes.surface import surface_of
+from bentray_kernels.requests.names import UpAxis
 
 from ..cluster.memory_cache import MemoryCache
 from ..files.geometry_field_folder import FieldFiles, mapped, read_chart, read_geometry_image, read_json
+from ..files.mesh import load_mesh, stored_faces
 from .field_scenes import scene_of
 from .field_tasks import FACE_BYTES
 from .field_view import FieldView
+from .up_axis import standing_axis
 
 # Memory of a process for cached fields, without memory-mapped tables.
 KEPT_BYTES = 2 * 2**30
@@ -33,24 +37,33 @@ _WORLDS = MemoryCache(KEPT_BYTES // 2)
 
 
 class Textured(NamedTuple):
-    """A shape, and its colours over (u, v) as ``Material.texture``, or None."""
+    """A shape, the axis on which it stands, and its colours over (u, v) as ``Material.texture``, or None."""
 
     shape: Shape
-    texture: Floats | None
+    up: UpAxis
+    texture: Floats | None = None
 
 
-def world_at(folder: Path, view: FieldView) -> World:
-    """The scene of the folder of a field, cached or new.
+def world_at(source: Path, view: FieldView) -> World:
+    """The scene of a mesh, cached or new.
+
+    Args:
+        source: the folder of its field, or its own file, of which all rays are intersected exactly.
+        view: what is drawn.
 
     Raises:
         InvalidInput: from the files.
     """
-    files = FieldFiles(folder)
-    stamp = folder, files.figures.stat().st_mtime_ns
-    figures = read_json(files.figures)
+    bare, files = source.is_file(), FieldFiles(source)
+    stamp = source, (source if bare else files.figures).stat().st_mtime_ns
+    figures = {"faces": stored_faces(source), "image_pixels": 0} if bare else read_json(files.figures)
     surface_bytes = FACE_BYTES * figures["faces"]
     image_bytes = 24 * figures["image_pixels"] ** 2
-    made: Textured = _SHAPES.get(stamp, surface_bytes + image_bytes, lambda: shape_of(files))
+    made: Textured = _SHAPES.get(
+        stamp, surface_bytes + image_bytes, lambda: bare_shape(source) if bare else shape_of(files)
+    )
+    if view.up == "auto":
+        view = replace(view, up=made.up)
     if view.reads_image:
         made = _with_reference(files, stamp, made, figures["image_pixels"])
     # Equal entries are marked for each scene, a byte each; a second surface is copied.
@@ -85,13 +98,25 @@ def _with_reference(files: FieldFiles, stamp: tuple[Path, int], made: Textured, 
     return made._replace(shape=replace(made.shape, reference=reference))
 
 
+def bare_shape(path: Path) -> Textured:
+    """The surface of a mesh file, without field and colours.
+
+    Raises:
+        InvalidInput: from the file.
+    """
+    mesh = load_mesh(path).mesh.in_unit_cube()
+    surface = surface_of(Chart(mesh, mesh.corners[..., :2]))
+    return Textured(Shape(surface), standing_axis(mesh.vertices))
+
+
 def shape_of(files: FieldFiles) -> Textured:
     """The surface of a field with memory-mapped tables.
 
     Raises:
         InvalidInput: from the files, and for tables that do not match the surface.
     """
-    surface = surface_of(read_chart(files.chart))
+    chart = read_chart(files.chart)
+    surface = surface_of(chart)
     faces, fractions = (mapped(path) for path in files.outer)
     starts, inner = mapped(files.starts), mapped(files.inner)
     if len(starts) != len(surface.triangles):
@@ -105,7 +130,7 @@ def shape_of(files: FieldFiles) -> Textured:
     )
     colours = read_geometry_image(files.image).colours
     texture = None if colours is None else np.clip(colours.transpose(1, 0, 2), 0.0, 1.0).astype(np.float64)
-    return Textured(shape, texture)
+    return Textured(shape, standing_axis(chart.mesh.vertices), texture)
 
 
 def _samples(columns: int) -> int:

@@ -1,9 +1,12 @@
-"""Pictures of geometry fields: ray-traced scenes, whole or in tiles, geometry images and normal maps."""
+"""Pictures of meshes and their geometry fields: ray-traced scenes, geometry images and normal maps."""
 
 from pathlib import Path
 
+import numpy as np
+
 from bentray_kernels.geometry_field.tracing.ray_tracer import TraceSettings, trace
 from bentray_kernels.opencl import check_available
+from bentray_kernels.refraction.edge_smoothing import smooth_edges
 from bentray_kernels.refraction.supersampling import averaged
 
 from ..cluster.task_cancellation import cancellation_check
@@ -16,12 +19,15 @@ from .field_scenes import camera_of
 from .field_view import LOOKUPS, FieldView
 from .refraction import part_of
 
+# Least difference between neighbouring rays at an edge of glass, levels of a colour.
+EDGE_LEVELS = 40
+
 
 def tile_image(folder: Path, view: FieldView, first: int, last: int, threads: int = 1) -> Drawn:
-    """Task: rows of the picture of a field, the last one not included.
+    """Task: rows of the picture of a mesh, the last one not included.
 
     Args:
-        folder: of the field.
+        folder: of its field, or the file of the mesh.
         view: what to draw.
         first, last: rows.
         threads: that trace rays.
@@ -33,8 +39,12 @@ def tile_image(folder: Path, view: FieldView, first: int, last: int, threads: in
 
 
 def _tile_image(folder: Path, view: FieldView, first: int, last: int, threads: int) -> Drawn:
+    glass = view.mode.startswith("refract")
+    # Edges of glass are smoothed twice, which uses the adjacent rays.
+    margin = -(-3 // view.rays) if glass else 0
+    top, bottom = max(first - margin, 0), min(last + margin, view.height)
     settings = TraceSettings(
-        rows=(last - first) * view.rays,
+        rows=(bottom - top) * view.rays,
         columns=view.width * view.rays,
         depth=view.depth,
         way=LOOKUPS[view.lookup],
@@ -44,14 +54,15 @@ def _tile_image(folder: Path, view: FieldView, first: int, last: int, threads: i
     # A request that cannot be met is an error before the tables are read.
     check_available(view.device)
     world, pause = world_at(folder, view), cancellation_check()
-    camera = part_of(camera_of(view), first / view.height, last / view.height)
+    camera = part_of(camera_of(view), top / view.height, bottom / view.height)
     # Published lookups of (u, v) exist for processors only.
     tracer = None if view.reads_image else tracer_for(world, settings.rows * settings.columns, view.device)
-    if tracer is None:
-        return Drawn(averaged(trace(world, camera, settings, pause), view.rays), name_of(None))
     pause()
-    image = averaged(tracer.trace(camera, settings), view.rays)
-    return Drawn(image, name_of(tracer.session, tracer.fault))
+    image = trace(world, camera, settings, pause) if tracer is None else tracer.trace(camera, settings)
+    if glass:
+        smooth_edges(image.astype(np.int16), EDGE_LEVELS, image)
+    device = name_of(tracer.session, tracer.fault) if tracer else name_of(None)
+    return Drawn(averaged(image, view.rays)[first - top : last - top], device)
 
 
 def picture_png(folder: Path, view: FieldView) -> bytes:
@@ -65,7 +76,7 @@ def viewer_tile(folder: Path, view: FieldView, first: int, last: int) -> Drawn:
 
 
 def tasks_of(folder: Path, view: FieldView) -> tiles.PictureTasks:
-    """The picture of the field in a folder as tasks."""
+    """The picture of a field in a folder, or of a mesh in a file, as tasks."""
     return tiles.tasks_of(picture_png, viewer_tile, folder, view)
 
 

@@ -16,6 +16,7 @@ from bentray_kernels.refraction import Camera, orthographic, perspective
 
 from ..images.landscape import landscape
 from .field_view import FieldView
+from .up_axis import UPRIGHT
 
 CLAY, RED, BLUE, SILVER = (0.85, 0.62, 0.42), (0.85, 0.3, 0.22), (0.28, 0.42, 0.85), (0.92, 0.92, 0.95)
 DARK = np.full((2, 4, 3), 0.06)
@@ -52,7 +53,7 @@ def scene_of(shape: Shape, texture: Floats | None, view: FieldView) -> Scene:
     Args:
         shape: the mesh and its fields.
         texture: (n, n, 3) colours of the mesh over (u, v), as ``Material.texture``, or None.
-        view: the settings.
+        view: the settings, with an axis that is up.
     """
     if view.scene == "object":
         instances = (
@@ -111,8 +112,7 @@ def _material(view: FieldView, colour: tuple[float, float, float], texture: Floa
 def _turned(view: FieldView, centre: tuple[float, float, float], size: float, turn_deg: float) -> Floats:
     """Transform of the unit cube: its up axis to z, rotated about the vertical."""
     about = placed((0.0, 0.0, 0.0), size, (0.0, 0.0, 1.0), turn_deg)[:, :3]
-    upright = placed((0.0, 0.0, 0.0), 1.0, (1.0, 0.0, 0.0), 90.0 if view.up == "y" else 0.0)[:, :3]
-    linear = about @ upright
+    linear = about @ UPRIGHT[view.up]
     return np.column_stack([linear, np.array(centre) - linear @ np.full(3, 0.5)])
 
 
@@ -120,8 +120,9 @@ def _upright(
     shape: Shape, view: FieldView, at: tuple[float, float], size: float, turn_deg: float, material: Material
 ) -> Instance:
     """The mesh on the ground."""
-    axis = 1 if view.up == "y" else 2
-    lowest = float(shape.surface.triangles[:, [axis, axis + 3, axis + 6]].min())
+    axis = "xyz".index(view.up[-1])
+    heights = shape.surface.triangles[:, [axis, axis + 3, axis + 6]]
+    lowest = 1.0 - float(heights.max()) if view.up.startswith("-") else float(heights.min())
     return Instance(shape, _turned(view, (*at, (0.5 - lowest) * size), size, turn_deg), material)
 
 

@@ -4,10 +4,12 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.requests.names import DESCRIPTION, DeviceRequest
+from bentray_kernels.requests.names import DESCRIPTION, DeviceRequest, UpAxis
 from bentray_kernels.requests.ranges import Range
 from bentray_kernels.requests.rendering_limits import MAX_REFERENCE_SAMPLES
 from bentray_kernels.requests.request_fields import MAX_PIXELS, MAX_RAYS, check, setting
+
+from .refraction_view import up_setting
 
 # Public names, and those of the kernels.
 LOOKUPS = {
@@ -98,7 +100,7 @@ class FieldView:
         label="Elevation, degrees",
     )
     zoom: float = setting(1.0, "Zoom factor: 1 shows the whole scene, 2 half of it.", Range(0.05, 50.0))
-    up: Literal["z", "y"] = setting("z", "Axis of the mesh that is up.", label="Up axis")
+    up: UpAxis = up_setting()  # noqa: RUF009 - a field, by its function
     positions_m: tuple[float, ...] = setting(
         (),
         "x and y of each object on the ground, m, as x1, y1, x2, y2 and so on, the ball last; by default "

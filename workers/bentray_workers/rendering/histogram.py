@@ -34,8 +34,8 @@ def volume_histogram(path: Path, quantity: str, bins: int) -> dict[str, Any]:
 
     Returns:
         ``counts`` and ``edges`` as by ``numpy.histogram``, ``minimum``, ``maximum``, ``mean`` and
-        ``deviation`` (standard deviation) in ``unit``; ``iso`` and ``smoothing`` of a picture of the volume
-        without these parameters, None where it cannot be rendered.
+        ``deviation`` (standard deviation) in ``unit``; ``iso``, ``smoothing`` and ``up`` of a picture of the
+        volume without these parameters, None where it cannot be rendered.
 
     Raises:
         InvalidInput: naming ``bins`` or ``quantity``, and from the file.
@@ -44,11 +44,11 @@ def volume_histogram(path: Path, quantity: str, bins: int) -> dict[str, Any]:
     values, spacing_m = _read(path, quantity)
     counts, edges = np.histogram(values, bins)
     unit = "" if quantity == "value" else QUANTITIES[quantity].unit
-    iso = smoothing = None
+    iso = smoothing = up = None
     if quantity in RENDERED:
         with suppress(InvalidInput):
             check_even(values.shape, spacing_m)
-            iso, smoothing = default_surface(path)
+            iso, smoothing, up = default_surface(path)
     return {
         "quantity": quantity,
         "unit": "" if unit == "1" else unit,
@@ -60,6 +60,7 @@ def volume_histogram(path: Path, quantity: str, bins: int) -> dict[str, Any]:
         "deviation": float(values.std(dtype=np.float64)),
         "iso": iso,
         "smoothing": smoothing,
+        "up": up,
     }
 
 

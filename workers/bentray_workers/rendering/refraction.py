@@ -32,6 +32,7 @@ from . import tiles
 from .drawing_device import PROCESSOR, Drawn, caster_for, name_of
 from .refraction_view import RefractionView
 from .scene_cache import scene_at
+from .up_axis import UPRIGHT, standing_axis_of
 
 # Width of the view at zoom 1, relative to the longest side of the volume.
 VIEW_MARGIN = 1.25
@@ -108,6 +109,8 @@ def draw_tile(
     Raises:
         InvalidInput: for a device that is requested and cannot be used.
     """
+    if view.up == "auto":
+        view = replace(view, up=standing_axis_of(scene.field, scene.spacing))
     tile, lost = computed(lambda: _draw_tile(scene, view, (first, last), card, threads))
     return tile._replace(device=f"{PROCESSOR}: {lost}") if lost else tile
 
@@ -116,8 +119,9 @@ def _draw_tile(
     scene: Scene, view: RefractionView, rows_drawn: tuple[int, int], card: Colours | None, threads: int
 ) -> Tile:
     first, last = rows_drawn
-    # Post-refraction supersampling uses the adjacent rows.
-    margin = 1 if view.supersampling == "prss" else 0
+    # Post-refraction supersampling uses the adjacent rows, and edges are smoothed twice.
+    smooth = view.mode == "refract" and view.supersampling != "none"
+    margin = 3 if smooth else 0
     top, bottom = max(first - margin, 0), min(last + margin, view.height)
     camera = part_of(camera_of(scene, view), top / view.height, bottom / view.height)
     rows = bottom - top
@@ -132,6 +136,7 @@ def _draw_tile(
         depth=view.depth,
         supersampling=view.supersampling,
         degree=view.degree,
+        smooth_edges=smooth,
         fresnel=view.fresnel,
         ray_spacing=view.ray_spacing,
         seed=top,
@@ -158,12 +163,13 @@ def camera_of(scene: Scene, view: RefractionView) -> Camera:
 
 
 def frame_of(view: RefractionView) -> tuple[Floats, Floats, Floats]:
-    """Unit vectors ahead, to the right and down in the picture, with z up."""
+    """Unit vectors ahead, to the right and down in the picture, in the axes of the volume."""
     azimuth, elevation = math.radians(view.azimuth_deg), math.radians(view.elevation_deg)
     east, north = math.cos(azimuth), math.sin(azimuth)
     ahead = -np.array([math.cos(elevation) * east, math.cos(elevation) * north, math.sin(elevation)])
     right = np.array([-north, east, 0.0])
-    return ahead, right, np.cross(ahead, right)
+    upright = UPRIGHT[view.up]
+    return ahead @ upright, right @ upright, np.cross(ahead, right) @ upright
 
 
 def _backdrop(scene: Scene, view: RefractionView, card: Colours | None) -> Backdrop:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.requests.names import DESCRIPTION, DeviceRequest
+from bentray_kernels.requests.names import DESCRIPTION, DeviceRequest, UpAxis
 from bentray_kernels.requests.ranges import Range
 from bentray_kernels.requests.rendering_limits import MAX_ISOS, MAX_SMOOTHING
 from bentray_kernels.requests.request_fields import MAX_PIXELS, MAX_RAYS, Uses, check, setting
@@ -27,6 +27,16 @@ SMOOTHING_8_BIT = 30.0
 
 # A test compares them with those of the splines, which load compiled code.
 FILTERS = ("central", "trilinear", "catmull-rom", "bspline2", "bspline3", "bspline4", "bspline5", "bspline6")
+
+
+def up_setting() -> Any:
+    """The field of a view for the axis that is up."""
+    return setting(
+        "auto",
+        "Axis of the object that is up; auto: z, unless it stands on a larger base on another side.",
+        label="Up axis",
+        words={"auto": "automatic"},
+    )
 
 
 @dataclass(frozen=True)
@@ -78,17 +88,18 @@ class RefractionView:
     camera: Literal["orthographic", "perspective"] = setting("orthographic", "Kind of camera.")
     azimuth_deg: float = setting(
         30.0,
-        "Azimuth of the camera about the z axis, degrees.",
+        "Azimuth of the camera about the vertical, degrees.",
         Range(-36000.0, 36000.0),
         label="Azimuth, degrees",
     )
     elevation_deg: float = setting(
         20.0,
-        "Elevation of the camera above the x-y plane, degrees.",
+        "Elevation of the camera above the horizon, degrees.",
         Range(-90.0, 90.0),
         label="Elevation, degrees",
     )
     zoom: float = setting(1.0, "Zoom factor: 1 shows the whole volume, 2 half of it.", Range(0.05, 50.0))
+    up: UpAxis = up_setting()  # noqa: RUF009 - a field, by its function
     backdrop: Literal["checkerboard", "picture", "warped-checkerboard", "warped-picture"] = setting(
         "checkerboard",
         "What is behind the volume: a plane with a checkerboard or a picture, or the same on a wavy surface.",
@@ -106,7 +117,8 @@ class RefractionView:
     )
     supersampling: Literal["none", "prss", "real"] = setting(
         "prss",
-        "prss: more samples of the backdrop after refraction; real: more rays.",
+        "prss: more samples of the backdrop after refraction; real: more rays; both smooth glass where "
+        "neighbouring rays take other paths.",
         words={"prss": "PRSS", "real": "more rays"},
     )
     degree: int = setting(

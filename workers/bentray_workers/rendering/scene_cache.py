@@ -18,6 +18,7 @@ from ..files.hdf5_reading import Limits, opened
 from ..files.volume import Volume
 from ..files.volume_formats import import_volume
 from .refraction_view import RefractionView, check_even
+from .up_axis import standing_axis_of
 
 # Bytes per node, measured for 128³ nodes and rounded up: of a spline, of a scene with it, and at the peak
 # while they are made.
@@ -101,14 +102,15 @@ def filtered_at(path: Path, view: RefractionView) -> FilteredVolume:
     return _filtered(path, stored_shape(path), view)[1]
 
 
-def default_surface(path: Path) -> tuple[float, float]:
-    """Iso-value and smoothing of a picture for which none are requested.
+def default_surface(path: Path) -> tuple[float, float, str]:
+    """Iso-value, smoothing and axis that is up of a picture for which none are requested.
 
     Raises:
         InvalidInput: from the file, and for a volume that is too large or constant.
     """
     filtered = filtered_at(path, RefractionView())
-    return RefractionView().filtered_within(*filtered.range).iso[0], filtered.smoothing
+    iso = RefractionView().filtered_within(*filtered.range).iso[0]
+    return iso, filtered.smoothing, standing_axis_of(filtered.spline, filtered.spacing_m)
 
 
 def _filtered(path: Path, shape: tuple[int, ...], view: RefractionView) -> tuple[SceneSource, FilteredVolume]:

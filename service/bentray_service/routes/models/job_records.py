@@ -264,6 +264,7 @@ class HistogramRecord(BaseModel):
         "rendered, and for other quantities."
     )
     smoothing: float | None = Field(description="Smoothing of this rendering.")
+    up: str | None = Field(description="Axis that is up in this rendering.")
 
 
 class VolumeList(BaseModel):

@@ -1,4 +1,4 @@
-// Volume rendering: a volume as a lit surface or as glass, turned by mouse, touch or keyboard, and turntables of it.
+// Volume rendering: a volume in three planes, as a lit surface or as glass, turned by mouse, touch or keyboard, and turntables of it.
 import { glassOf, keepQuery, queryOf, shownBy } from "../parts/address.js";
 import { propertiesOf, request } from "../parts/api.js";
 import { KeyLink } from "../parts/key.js";
@@ -7,6 +7,10 @@ import { PlainField } from "../parts/settings_fields.js";
 import { html, useEffect, useRead, useReducer, useRef, useState } from "../parts/view.js";
 import { planOf, waitInWords } from "../parts/words.js";
 import { CAMERA, FULL_PX, PREVIEW_PX, rounded, ScenePage, useScene } from "../scenes/scene.js";
+import { ChoiceBar } from "../viewer/controls.js";
+import { Values } from "../viewer/quantities.js";
+import { stateOf } from "../viewer/state.js";
+import { Viewer } from "../viewer/viewer.js";
 import { localPreviews } from "../webgl/local_previews.js";
 
 // The side of the picture that a link opens, pixels.
@@ -26,7 +30,7 @@ function samplingOf({ mode, supersampling }) {
 }
 
 // The view of a volume that the values of the form state; without iso-value and index, those that suit the volume.
-function viewOf(volume, { frames, iso, index, smoothing, filter, ...rest }) {
+function viewOf(volume, { frames, iso, index, smoothing, filter, up, ...rest }) {
   const suited = volume.water_speed_mps === null ? { index: [UPLOAD_INDEX] } : iso || index ? {} : glassOf(volume);
   delete suited.elevation_deg;
   return shownBy({
@@ -35,6 +39,7 @@ function viewOf(volume, { frames, iso, index, smoothing, filter, ...rest }) {
     ...(index && { index: [Number(index)] }),
     ...(smoothing && { smoothing: Number(smoothing) }),
     ...(filter !== "bspline3" && { filter }),
+    ...(up !== "auto" && { up }),
     mode: rest.mode,
     ...(rest.mode === "refract" && { backdrop: rest.backdrop }),
     ...samplingOf(rest),
@@ -58,7 +63,8 @@ function drawerOf(local, volume, view, histogram) {
   const { index = [1.5], ...rest } = view;
   // The default iso-value is known for the default filter and smoothing alone.
   const iso = isoValuesOf(view, view.filter || view.smoothing !== undefined ? null : histogram);
-  return local.drawer(volume, { ...rest, iso, index: iso.map((_, k) => index[k] ?? index[0]) }, PREVIEW_PX);
+  const up = view.up ?? histogram?.up;
+  return up && local.drawer(volume, { ...rest, up, iso, index: iso.map((_, k) => index[k] ?? index[0]) }, PREVIEW_PX);
 }
 
 // What differs from the defaults of a form, so that the address restores the view.
@@ -128,8 +134,17 @@ function Fields({ volume, histogram, marks, fields, onSlide }) {
       ${field("index", { value: "", placeholder: !volume ? "automatic" : volume.water_speed_mps === null ? UPLOAD_INDEX : "automatic: of sound" })}
       ${["backdrop", "supersampling"].map((name) => field(name))}
       ${field("smoothing", { placeholder: automatic(histogram?.smoothing) })}
-      ${["filter", "zoom", "azimuth_deg", "elevation_deg", "frames"].map((name) => field(name, { required: true }))}
+      ${["filter", "up", "zoom", "azimuth_deg", "elevation_deg", "frames"].map((name) => field(name, { required: true }))}
     </div>`;
+}
+
+const VIEWS = { planes: "Planes", surface: "Surface" };
+
+// A volume in planes across its axes, in the viewer of results; query: of the address.
+function Planes({ volume, query }) {
+  const [state] = useState(() => ({ ...stateOf(query), ...(query.get("view") !== "planes" && { planes: true }) }));
+  const [panes] = useState(() => [{ title: titleOf(volume), values: new Values(volume), stored: [volume.source === "upload" ? "value" : "speed"] }]);
+  return html`<${Viewer} panes=${panes} state=${state} keep=${(view) => keepQuery(new URLSearchParams([["view", "planes"], ...view]))} id="planes" aria-label="Planes" />`;
 }
 
 // fields: of the form, as schemas by name.
@@ -142,6 +157,9 @@ function Rendering({ volumes, id, query, fields }) {
   const scene = useScene({ records: volumes, id, query, pictureOf });
   const { record: volume, form, values, show, setError } = scene;
   const [histogram, readHistogram] = useHistogram(volume, setError);
+  // An upload opens in planes, unless the address describes its surface.
+  const [shown, setShown] = useState(query.get("view") ?? (volume?.source === "upload" && !query.size ? "planes" : "surface"));
+  const inPlanes = Boolean(volume) && shown === "planes";
   const turntable = (given = values()) => (
     { kind: "refraction", volume: volume.id, settings: { ...viewOf(volume, given), frames: Number(given.frames), format: "apng" } }
   );
@@ -156,14 +174,16 @@ function Rendering({ volumes, id, query, fields }) {
       full,
       drawHere: drawerOf(local, record, view, histogram),
       keep() {
-        keepQuery(changedIn(form.current));
+        keepQuery(new URLSearchParams([["view", "surface"], ...changedIn(form.current)]));
         setLink(`${record.links.refraction}?${queryOf({ ...view, width: LINKED_PX, height: LINKED_PX })}`);
       },
     };
   }
 
   useEffect(() => local.close, []);
-  useEffect(() => show(), [volume?.id]);
+  useEffect(() => {
+    if (!inPlanes) show();
+  }, [volume?.id, inPlanes]);
   // What is chosen by default is known.
   useEffect(() => {
     if (histogram) setMarks(isoValuesOf(viewOf(volume, values()), histogram));
@@ -175,6 +195,7 @@ function Rendering({ volumes, id, query, fields }) {
     form.current.reset();
     scene.setRecords(await loadVolumes());
     scene.choose(name);
+    setShown("planes");
   }
 
   const describe = () => {
@@ -201,6 +222,8 @@ function Rendering({ volumes, id, query, fields }) {
   return html`<${ScenePage} scene=${scene} title="Volume rendering" name="volume" path="/rendering" onStored=${onStored} onChange=${() => show()}
     stage=${{ id: "glass", words: WORDS, hint: "The image appears here", describe, onShown: readHistogram, onError }}
     formats="NumPy (.npy, .npz), NRRD, NIfTI or HDF5 of Bentray" none="No 3-D volume yet" form="look" products=${products}
+    above=${volume && html`<${ChoiceBar} label="View" className="views" entries=${Object.entries(VIEWS)} chosen=${shown} onChoose=${setShown} />`}
+    instead=${inPlanes && html`<${Planes} key=${volume.id} volume=${volume} query=${query} />`}
     facts=${volume && `${volume.shape.join(" × ")} nodes · values ${volume.value_range.map(rounded).join(" to ")} ${volume.unit}`}
     fields=${html`<${Fields} volume=${volume} histogram=${histogram} marks=${marks} fields=${fields} onSlide=${slide} />`}
     begin=${{ id: "turn", title: "Render a turntable", job: turntable }}

@@ -8,8 +8,8 @@ import { inTime } from "../parts/words.js";
 
 // Scans on one page of the list.
 const PAGE_LENGTH = 25;
-const ACCEPT = ".h5,.hdf5,.mat,.npz,.zip,application/x-hdf5";
-const FORMATS = "HDF5 (uct-transmission, zea, openUSCT), MATLAB, NumPy, zip of k-Wave or KIT 3D USCT";
+const ACCEPT = ".h5,.hdf5,.mat,.npz,.zip,application/x-hdf5,.npy,.nrrd,.nii,.nii.gz,.ply,.obj,.off,.stl,.gltf,.glb";
+const FORMATS = "HDF5 (uct-transmission, zea, openUSCT), MATLAB, NumPy, zip of k-Wave or KIT 3D USCT; volumes and meshes open on their own pages";
 
 // What the form states about a file of another program.
 function metadataIn(form) {

@@ -1,4 +1,4 @@
-// Surface rendering: a mesh with its geometry field as mirror, glass or clay, turned by mouse, touch or keyboard, its objects moved.
+// Surface rendering: a mesh, with its geometry field once it has one, as clay, mirror or glass, turned by mouse, touch or keyboard, its objects moved.
 import { keepQuery, queryOf } from "../parts/address.js";
 import { parametersOf, propertiesOf, request } from "../parts/api.js";
 import { load, titleOf } from "../parts/lists.js";
@@ -9,6 +9,8 @@ import { objectAt, objectsOf, placeAt } from "../scenes/camera.js";
 import { CAMERA, clamped, FULL_PX, PREVIEW_PX, ScenePage, useScene } from "../scenes/scene.js";
 
 const WORDS = ["View of the scene: arrow keys turn it, plus and minus zoom, Home resets; objects on the ground are dragged", "No image yet"];
+// What is it? Clay comes first, mirror and glass second.
+const FIRST = { mode: "diffuse" };
 const FIELDS = ["mode", "scene", "lookup", "up", "index", "share", ...CAMERA, "samples"];
 
 function factsOf({ faces, closed, holes, genus, repairs }) {
@@ -94,12 +96,12 @@ function Surfaces({ meshes, built, id, query, fields }) {
   const scene = useScene({ records: meshes, id, query, pictureOf });
   const { record: mesh, form, values, show } = scene;
   const field = mesh && links[mesh.id];
+  const image = field?.image ?? mesh?.links.image;
   const limits = fields.positions_m.items;
 
   function pictureOf(_, given) {
-    if (!field) return null;
     const view = viewOf(given);
-    const address = (rest) => `${field.image}?${queryOf({ ...view, ...rest })}`;
+    const address = (rest) => `${image}?${queryOf({ ...view, ...rest })}`;
     return {
       preview: address({ width: PREVIEW_PX, height: PREVIEW_PX }),
       full: address({ rays: 2, width: FULL_PX, height: FULL_PX }),
@@ -146,13 +148,13 @@ function Surfaces({ meshes, built, id, query, fields }) {
     scene.choose(made.id);
   };
   const job = () => ({ kind: "geometry-field", mesh: mesh.id, settings: { samples: Number(values().samples) } });
-  const hint = mesh ? "The image appears here once the field is built" : "The image appears here";
   return html`<${ScenePage} scene=${{ ...scene, camera }} title="Surface rendering" name="mesh" path="/surfaces" onStored=${onStored} onChange=${onChange}
-    stage=${{ id: "field-picture", words: WORDS, hint, describe }} formats="PLY, OBJ, OFF, STL, glTF or GLB" none="No mesh uploaded yet" form="field"
+    stage=${{ id: "field-picture", words: WORDS, hint: "The image appears here", describe }} formats="PLY, OBJ, OFF, STL, glTF or GLB" none="No mesh uploaded yet" form="field"
     below=${html`<div id="accuracy">${field && html`<${Accuracy} address=${field.field} onError=${scene.setError} />`}</div>`}
     facts=${mesh && factsOf(mesh)} products="geometry fields"
     fields=${html`
-      <div class="numbers">${FIELDS.map((name) => html`<${PlainField} name=${name} given=${fields[name]} required />`)}</div>
+      <div class="numbers">${FIELDS.map((name) => html`<${PlainField} name=${name} given=${fields[name]} value=${FIRST[name]} required
+        disabled=${name === "lookup" && !field} />`)}</div>
       <${Objects} scene=${standing} places=${places} limits=${limits} />`}
     begin=${{ id: "make", title: "Build the geometry field", job }}
     jobs=${{ title: "Geometry fields", kind: "geometry-field", empty: "No geometry field yet", onJobs }} />`;

@@ -1,9 +1,45 @@
-// A drop zone for files: uploads them one after the other, and shows progress and errors.
+// A drop zone for files: uploads them one after the other as what they are, and shows progress and errors.
+import { go } from "./address.js";
 import { resumableUpload } from "./resumable_upload.js";
 import { html, useEffect, useNewest, useRef, useShown, useState } from "./view.js";
 
 const DRAGS = ["dragover", "dragleave", "drop"];
-const SECTIONS = { scan: "scans", volume: "volumes", mesh: "meshes" };
+// What is stored: its name, its section of the formats, its page, and the names and first bytes of its files.
+const KINDS = {
+  dataset: { noun: "a scan", section: "scans", path: "/scans", names: /\.mat$/i, starts: /^(\x89HDF|PK|MATLAB)/ },
+  volume: {
+    noun: "a volume", section: "volumes", path: "/rendering", names: /\.(npy|nrrd|nii|nii\.gz)$/i,
+    starts: /^(\x89HDF|PK|\x93NUMPY|NRRD|\x1f\x8b|[^]{344}n\+1|[^]{4}n\+2)/,
+  },
+  mesh: { noun: "a mesh", section: "meshes", path: "/surfaces", names: /\.(ply|obj|off|stl|gltf|glb)$/i, starts: /^(ply|C?N?OFF|glTF|solid)\b/ },
+};
+const START_BYTES = 400;
+
+// The kinds that a file may be of, by its name, else by its first bytes, those of its page first; none for an unknown file.
+async function kindsOf(file, own) {
+  const all = Object.keys(KINDS).sort((a, b) => (b === own) - (a === own));
+  const named = all.filter((kind) => KINDS[kind].names.test(file.name));
+  if (named.length) return named;
+  const start = new TextDecoder("latin1").decode(await file.slice(0, START_BYTES).arrayBuffer());
+  return all.filter((kind) => KINDS[kind].starts.test(start));
+}
+
+// Stores a file: { kind, record }. metadata: of a file of the kind that it states.
+async function store(file, metadata, onProgress) {
+  const kinds = await kindsOf(file, metadata.kind);
+  let refusal = null;
+  for (const kind of kinds.length ? kinds : [metadata.kind]) {
+    try {
+      const stated = kind === metadata.kind ? metadata : { kind, title: file.name.slice(0, 200) };
+      return { kind, record: await resumableUpload(file, stated, onProgress) };
+    } catch (error) {
+      if (!error.problem) throw error;
+      refusal ??= error;
+    }
+  }
+  const noun = kinds.length === 1 ? KINDS[kinds[0]].noun : "a scan, a volume or a mesh";
+  throw Object.assign(new Error(`${file.name} is not ${noun} that can be read. ${refusal.message}`), { problem: refusal.problem });
+}
 
 // Files that are dragged anywhere on the page; onFiles(files) once they are dropped. Returns whether some are over it.
 function useDrops(onFiles) {
@@ -25,7 +61,8 @@ function useDrops(onFiles) {
 }
 
 // name: "scan", "volume" or "mesh", which begins the ids; metadataOf(file): see resumableUpload. onStored(record, several) is called after
-// the last file, onRefused() when one is rejected, onBegin() when there is something to send again: by again.current().
+// the last file, onRefused() when one is rejected, onBegin() when there is something to send again: by again.current(). A file of another kind
+// is stored, too, and its page opened if there is none of this kind.
 export function DropZone({ name, accept = "", prompt, formats, again = {}, ...handlers }) {
   const { metadataOf, onStored, onRefused, onBegin } = useNewest(handlers).current;
   const [{ words, share, errors }, setState] = useState({ words: "", share: null, errors: [] });
@@ -40,12 +77,15 @@ export function DropZone({ name, accept = "", prompt, formats, again = {}, ...ha
     onBegin?.();
     change({ errors: [] });
     const [refused, found] = [[], []];
-    let stored = null;
+    let [stored, elsewhere] = [null, null];
     for (const [number, file] of files.entries()) {
       const before = files.length > 1 ? `${number + 1} of ${files.length}: ` : "";
       change({ words: `${before}Sending ${file.name}`, share: 0 });
       try {
-        stored = await resumableUpload(file, metadataOf(file), (done, text) => change({ words: before + text, share: done }));
+        const metadata = metadataOf(file);
+        const { kind, record } = await store(file, metadata, (done, text) => change({ words: before + text, share: done }));
+        if (kind === metadata.kind) stored = record;
+        else elsewhere = `${KINDS[kind].path}/${record.id}`;
         change({ words: `${before}${file.name} is stored` });
       } catch (error) {
         found.push(error);
@@ -56,10 +96,11 @@ export function DropZone({ name, accept = "", prompt, formats, again = {}, ...ha
     }
     input.current.value = "";
     if (refused.length) last.current = refused;
-    change({ share: null, errors: found, ...(!stored && { words: "" }) });
+    change({ share: null, errors: found, ...(!stored && !elsewhere && { words: "" }) });
     if (found.length) onRefused?.();
     try {
       if (stored) await onStored(stored, files.length > 1);
+      else if (elsewhere) go(elsewhere);
     } catch (error) {
       change({ errors: [error] });
     }
@@ -80,6 +121,6 @@ export function DropZone({ name, accept = "", prompt, formats, again = {}, ...ha
     </div>
     <p id=${`${name}-error`} class="error" role="alert" hidden=${!errors.length}>
       ${errors.map((error) => error.message).join(" · ")}
-      ${errors.some((error) => error.problem) && html` <a href=${`/docs/formats#${SECTIONS[name]}`}>Accepted formats</a>`}
+      ${errors.some((error) => error.problem) && html` <a href=${`/docs/formats#${KINDS[name === "scan" ? "dataset" : name].section}`}>Accepted formats</a>`}
     </p>`;
 }

@@ -8,8 +8,6 @@ const WAITS = [500, 1000, 2000, 4000, ...Array(14).fill(8000)];
 // Between two questions whether a file is stored, the first and the longest, ms; each is twice the one before.
 const POLLS = [40, 300];
 
-const NOUNS = { dataset: "a scan", volume: "a volume", mesh: "a mesh" };
-
 // Whether a failure passes: no answer, another offset, an upload that is locked by a lost connection, a busy service.
 const passes = (status) => !status || [409, 423, 429].includes(status) || status >= 500;
 const statusOf = (error) => error.originalResponse?.getStatus();
@@ -66,8 +64,7 @@ export async function resumableUpload(file, metadata, onProgress) {
   onProgress(1, `Checking ${file.name}`);
   const record = await ingested(address);
   if (record.state === "refused") {
-    const words = `${file.name} is not ${NOUNS[metadata.kind]} that can be read. ${inWords(record.problem)}`;
-    throw Object.assign(new Error(words), { problem: record.problem });
+    throw Object.assign(new Error(inWords(record.problem)), { problem: record.problem });
   }
   return request(record.links.result);
 }

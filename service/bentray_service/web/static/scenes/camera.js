@@ -14,13 +14,23 @@ export function objectsOf(scene) {
 
 const radians = (degrees) => (degrees * Math.PI) / 180;
 
-// Unit vectors to the right, down and ahead of a camera, with z up.
-export function frameOf(azimuthDeg, elevationDeg) {
+// The axes of an object that are along x, y and z of the scene, by the one that is up; as in bentray_workers.rendering.up_axis.
+const UPRIGHT = {
+  z: ["x", "y", "z"], y: ["x", "-z", "y"], x: ["-z", "y", "x"], "-z": ["x", "-y", "-z"], "-y": ["x", "z", "-y"], "-x": ["z", "y", "-x"],
+};
+
+// Unit vectors to the right, down and ahead of a camera, in the axes of an object one of which is up.
+export function frameOf(azimuthDeg, elevationDeg, up = "z") {
   const [a, e] = [radians(azimuthDeg), radians(elevationDeg)];
+  const turned = (vector) => {
+    const result = [0, 0, 0];
+    UPRIGHT[up].forEach((axis, k) => (result["xyz".indexOf(axis.at(-1))] = axis.length > 1 ? -vector[k] : vector[k]));
+    return result;
+  };
   return {
-    right: [-Math.sin(a), Math.cos(a), 0],
-    down: [Math.sin(e) * Math.cos(a), Math.sin(e) * Math.sin(a), -Math.cos(e)],
-    ahead: [-Math.cos(e) * Math.cos(a), -Math.cos(e) * Math.sin(a), -Math.sin(e)],
+    right: turned([-Math.sin(a), Math.cos(a), 0]),
+    down: turned([Math.sin(e) * Math.cos(a), Math.sin(e) * Math.sin(a), -Math.cos(e)]),
+    ahead: turned([-Math.cos(e) * Math.cos(a), -Math.cos(e) * Math.sin(a), -Math.sin(e)]),
   };
 }
 

@@ -62,6 +62,9 @@ export function useScene({ records: first, id, query, pictureOf }) {
     if (!valid && record && !moving) form.current.reportValidity();
     const picture = valid && record ? pictureOf(record, values()) : null;
     if (!picture) return;
+    const { up } = values();
+    if (up === "auto") localStorage.removeItem(`up ${record.id}`);
+    else localStorage.setItem(`up ${record.id}`, up);
     stream.current.show(picture, moving);
     later(picture.keep, KEEP_MS);
   }
@@ -69,6 +72,10 @@ export function useScene({ records: first, id, query, pictureOf }) {
   useEffect(() => {
     for (const [name, value] of query) Object.assign(form.current.elements.namedItem(name) ?? {}, { value });
   }, []);
+  // The axis that is up belongs to the record: this browser keeps it.
+  useEffect(() => {
+    if (record && !query.has("up")) form.current.elements.up.value = localStorage.getItem(`up ${record.id}`) ?? "auto";
+  }, [record?.id]);
   return { records, setRecords, record, choose, error, act, setError, form, stream, refresh, values, show, camera: cameraOf(form, show) };
 }
 
@@ -136,12 +143,12 @@ function Stage({ id, words, hint, describe, onShown = () => {}, onError, camera,
     <${Facts} id="view-facts">${shown?.facts}</${Facts}>`;
 }
 
-// A whole page. scene: of useScene; name: of the kind of record; path: of the page; stage: see Stage; below: the picture; formats, none: of files,
-// and without a record; onStored(record): after an upload; facts: of the record; form: its id; onChange(): of the form; fields: in it; begin:
+// A whole page. scene: of useScene; name: of the kind of record; path: of the page; stage: see Stage; above, below: the picture; instead: what is
+// shown in place of the picture and the fields; formats, none: of files, and without a record; onStored(record): after an upload; facts: of the record; form: its id; onChange(): of the form; fields: in it; begin:
 // { id, title, job() } of the button that starts a job; actions: beside it; products: what is deleted with a record, null if it is not deleted
 // here; jobs: { title, kind, empty, onJobs } of the jobs below.
 export function ScenePage(props) {
-  const { scene, title, name, path, stage, below, formats, none, onStored, facts, form, onChange, fields, begin, products, actions, jobs, children } = props;
+  const { scene, title, name, path, stage, above, instead, below, formats, none, onStored, facts, form, onChange, fields, begin, products, actions, jobs, children } = props;
   const { record, records, act, camera } = scene;
   const entries = records.length ? records.map((one) => [one.id, `${titleOf(one)} (${inTime(one.created)})`]) : [["", none]];
   const start = () => act(async () => {
@@ -153,8 +160,12 @@ export function ScenePage(props) {
     <h1>${title}</h1>
     <section aria-label=${title} class="panel viewer">
       <div>
-        <${Stage} onError=${scene.setError} camera=${camera} stream=${scene.stream} ...${stage}
-          hint=${record && !scene.error ? html`<${Waiting} words="Drawing the first picture" />` : stage.hint} />
+        ${above}
+        <div hidden=${Boolean(instead)}>
+          <${Stage} onError=${scene.setError} camera=${camera} stream=${scene.stream} ...${stage}
+            hint=${record && !scene.error ? html`<${Waiting} words="Drawing the first picture" />` : stage.hint} />
+        </div>
+        ${instead}
         <${Alert} id=${`${form}-error`} error=${scene.error} />
         ${below}
       </div>
@@ -165,10 +176,10 @@ export function ScenePage(props) {
           onChange=${({ target }) => go(`${path}/${target.value}`)} />
         <${Facts} id=${`${name}-facts`}>${facts}</${Facts}>
         <${Form} id=${form} ref=${scene.form} onChange=${onChange} onSubmit=${start}>
-          ${fields}
+          <div hidden=${Boolean(instead)}>${fields}</div>
           <div class="actions">
             <button id=${begin.id} type="submit" disabled=${!record}>${begin.title}</button>
-            <${Button} id="reset-view" onClick=${camera.reset}>Reset the view</${Button}>
+            <${Button} id="reset-view" hidden=${Boolean(instead)} onClick=${camera.reset}>Reset the view</${Button}>
             <${Button} id=${`delete-${name}`} hidden=${!record || !products} onClick=${remove}>Delete the ${name}</${Button}>
             ${actions}
           </div>

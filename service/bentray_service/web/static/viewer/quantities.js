@@ -28,6 +28,7 @@ export const QUANTITIES = {
     title: "Difference to truth", words: "speed minus true speed", unit: "m/s", map: "RdBu_r", digits: 2, reads: ["speed", "truth"],
     symmetric: true,
   },
+  value: { title: "Values", words: "value", unit: "", map: "gray", digits: 3, reads: ["value"] },
   truth: { title: "Truth", words: "true sound speed", unit: "m/s", map: "viridis", digits: 2, reads: ["truth"] },
   attenuation: {
     title: "Attenuation (experimental)", words: "attenuation, experimental", unit: "dB/cm", map: "cividis", digits: 4,
@@ -75,7 +76,9 @@ export class Values {
 
   stored(name, onProgress) {
     if (!this.read.has(name)) {
-      const reading = bytesOf(`${this.volume.links.data}?format=npy&quantity=${name}`, onProgress).then(parseNpy);
+      // An upload has nothing but its values.
+      const quantity = name === "value" ? "" : `&quantity=${name}`;
+      const reading = bytesOf(`${this.volume.links.data}?format=npy${quantity}`, onProgress).then(parseNpy);
       reading.catch(() => this.read.delete(name));
       this.read.set(name, reading);
     }

@@ -234,7 +234,7 @@ function Body({ read, panes, state, change, drawn }) {
 
 // panes: [{ title, values, stored, notes, detail }], with Values, the names of the stored quantities, notes as for ChoiceBar, and the resolution width, mm, if it is known. state: of the view, which is changed in place;
 // keep(query): called when the view changes; drawn: { current }, which becomes a function that gives what figureOf draws.
-export function Viewer({ panes, state, keep, drawn, ...more }) {
+export function Viewer({ panes, state, keep, drawn = {}, ...more }) {
   // The quantities that all panes have.
   const names = shownOf(panes[0].stored.filter((name) => panes.every(({ stored }) => stored.includes(name))));
   if (!names.includes(state.quantity)) [state.quantity] = names;
@@ -253,9 +253,9 @@ export function Viewer({ panes, state, keep, drawn, ...more }) {
   };
   return html`<section class="image-viewer" aria-busy=${words ? "true" : undefined} ...${more}>
     <div class="viewer-bar">
-      <${ChoiceBar} label="Quantity" className="quantities" entries=${names.map((name) => [name, QUANTITIES[name].title])} chosen=${state.quantity}
+      ${names.length > 1 && html`<${ChoiceBar} label="Quantity" className="quantities" entries=${names.map((name) => [name, QUANTITIES[name].title])} chosen=${state.quantity}
         notes=${Object.assign({}, ...panes.map(({ notes }) => notes))}
-        onChoose=${(name) => change({ quantity: name, window: null, map: null })} />
+        onChoose=${(name) => change({ quantity: name, window: null, map: null })} />`}
       ${panes.length > 1 && html`<${ChoiceBar} label="Comparison" className="comparison-modes" entries=${Object.entries(MODES)} chosen=${state.mode}
         onChoose=${(mode) => change({ mode, window: null, map: null })} />`}
       ${others.length > 0 && html`<${Overlay} entries=${others.map((name) => [name, QUANTITIES[name].title])} state=${state} change=${change} />`}

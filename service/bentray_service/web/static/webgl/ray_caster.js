@@ -119,13 +119,13 @@ export function rayCaster(canvas, { values, shape, spacing, filter }) {
   if (gl.getError() !== gl.NO_ERROR) throw new Error("The volume does not fit into WebGL2");
 
   // view: as the parameters of refraction.png; iso and index are lists. Returns the time that it took, ms.
-  function draw({ width, height, azimuth_deg, elevation_deg, zoom, mode, iso, index, outside = 1, surroundings = 0 }) {
+  function draw({ width, height, azimuth_deg, elevation_deg, up, zoom, mode, iso, index, outside = 1, surroundings = 0 }) {
     if (gl.isContextLost()) throw new Error("The graphics card was lost");
     const begun = performance.now();
     canvas.width = width;
     canvas.height = height;
     gl.viewport(0, 0, width, height);
-    const { right, down, ahead } = frameOf(azimuth_deg, elevation_deg);
+    const { right, down, ahead } = frameOf(azimuth_deg, elevation_deg, up);
     const diagonal = Math.hypot(...extent);
     const wide = ((VIEW_MARGIN * Math.max(...extent)) / zoom) * Math.max(1, width / height);
     const light = ahead.map((one, axis) => -one - 0.6 * right[axis] - 0.8 * down[axis]);
