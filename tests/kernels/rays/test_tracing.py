@@ -206,3 +206,12 @@ def test_unknown_gradients_are_rejected():
         rays.trace(np.ones((4, 4)), 1.0, [(1.0, 1.0)], (2.0, 2.0), gradient="sobel")
     with pytest.raises(InvalidInput, match="ray_gradient"):
         Settings.from_values(ray_gradient="sobel")
+
+
+@pytest.mark.parametrize("shape", [(1, 9), (9, 1), (1, 1, 9)])
+def test_a_grid_may_be_one_node_wide(shape):
+    source = np.zeros(len(shape))
+    time = eikonal.solve(np.full(shape, 1500.0), 1e-3, source)
+    far = 1e-3 * (np.array([shape]) - 1.0)
+    (path,) = rays.trace(time, 1e-3, far, source)
+    np.testing.assert_allclose(path, far * np.linspace(1.0, 0.0, 9)[:, None], atol=1e-9)

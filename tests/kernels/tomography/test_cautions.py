@@ -8,7 +8,8 @@ import pytest
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.noise import with_noise
 from bentray_kernels.tomography import Caution, Reconstruction, Settings, reconstruct
-from bentray_kernels.tomography.cautions import attenuation_cautions, bound_cautions
+from bentray_kernels.tomography.cautions import attenuation_cautions, bound_cautions, fit_cautions
+from bentray_kernels.tomography.result import residual_counts
 
 from ..straight_scans import DATA, chords_m, radar, ring_scan, trunk
 
@@ -100,6 +101,16 @@ def test_an_image_of_impossible_times_is_doubted(name: str, method: str) -> None
     scan, settings, expected = BAD[name]
     computed = codes(image(scan, method, **settings))
     assert expected.intersection(computed), computed
+
+
+@pytest.mark.parametrize(("left", "found"), [(0.4, []), (0.7, ["residual"]), (1.0, ["constant"])])
+def test_an_image_that_explains_little_more_than_a_constant_is_doubted(left: float, found: list[str]) -> None:
+    scan = ring(1400.0, 0.06)
+    delta = scan.delta_tof_s
+    over = delta - WAY * (WAY * delta).sum() / (WAY**2).sum()
+    history = image(DISC, "sart").history
+    cautions = [*fit_cautions(scan, Settings(), residual_counts(left * over), history)]
+    assert [one.code for one in cautions if one.doubtful] == found
 
 
 def test_the_sentences_hold_the_numbers_and_what_to_do() -> None:

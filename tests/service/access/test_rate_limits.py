@@ -7,6 +7,7 @@ from bentray_service.access import rate_limits
 from bentray_service.access.rate_limits import RateLimits
 
 from ...clock import Clock
+from ..conftest import signed
 
 
 @given(st.integers(1, 50), st.lists(st.floats(0.0, 40.0), max_size=120))
@@ -28,6 +29,14 @@ def test_rate_is_bounded_by_bucket_size_and_refill(per_minute, waits):
 def test_nought_is_any_number():
     limits = RateLimits(0)
     assert {limits.take("a") for _ in range(1000)} == {0.0}
+
+
+def test_a_request_for_what_workers_compute_counts_one(start, work, uploaded):
+    http = start(renders_per_minute=2)
+    http.app.state.access.sign_in._renders._clock = Clock()
+    http.headers.update(signed(http))
+    here = f"/v1/datasets/{uploaded(http)}/geometry"
+    assert [http.get(here).status_code for _ in range(3)] == [200, 200, 429]
 
 
 def test_full_buckets_are_dropped(monkeypatch):

@@ -2,6 +2,7 @@
 
 import time
 from datetime import UTC, datetime
+from types import SimpleNamespace
 
 import pytest
 from sqlalchemy import func, insert, select, update
@@ -366,6 +367,19 @@ def test_the_audit_log_is_kept_as_long_as_it_is_said(shelf):
     clocks.pass_by(DAY_S + 1.0)
     keeper.sweep()
     assert left() == sorted(days[:3])
+
+
+@pytest.mark.parametrize("bucket", [False, True])
+def test_the_store_is_tidied_once_an_hour(shelf, monkeypatch, bucket):
+    tidied = []
+    direct = SimpleNamespace(tidy=lambda _ids: tidied.append("uploads")) if bucket else None
+    store = SimpleNamespace(tidy=lambda _stop: tidied.append("store"), direct_uploads=direct)
+    monkeypatch.setattr(shelf.files, "store", store)
+    keeper = housekeeper(shelf, Clocks())
+    monkeypatch.setattr(keeper._orphans, "sweep", lambda _stop: tidied.append("orphans"))
+    keeper._step()
+    keeper._step()
+    assert tidied == ["store", *["uploads"] * bucket, "orphans"]
 
 
 def housekeeper(shelf, clocks, keep_days=30.0, audit_keep_days=None):
