@@ -50,10 +50,12 @@ class Losses:
         held_out: number of pairs held out, and the sums of their squared misfits, Np², by an image of the
             training pairs and by the one attenuation inside the array that fits these best; zeros without
             such pairs.
+        guided: how far rays gather in thin fast layers, see ``ModelErrors``.
     """
 
     image: Floats
     held_out: Floats
+    guided: float = 0.0
 
 
 def active_emitters(problem: Problem) -> Ints:

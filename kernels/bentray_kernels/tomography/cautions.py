@@ -14,6 +14,7 @@ from .pairs import reciprocal_differences
 from .result import Caution, Iteration, Reconstruction, residual_within
 from .settings import Settings
 from .stopping import travel_time_noise
+from .uncertainty.model_errors import GUIDED
 
 # This part of the residuals is judged, so that a few wrong picks do not decide; of normal ones with standard
 # deviation 1 it is within ``NORMAL``.
@@ -135,18 +136,26 @@ def bound_cautions(
         )
 
 
-def attenuation_cautions(held_out: Floats) -> Iterator[Caution]:
+def attenuation_cautions(held_out: Floats, guided: float) -> Iterator[Caution]:
     """Whether the image of the attenuation is no better than a constant.
+
+    Amplitudes that were read along a thin fast layer are predicted well, in wrong places.
 
     Args:
         held_out: of all slices, see ``attenuation.Losses``.
+        guided: the largest of all slices.
     """
     _, image, constant = held_out
-    if image > 0.0 and math.sqrt(image) > CLEARLY * math.sqrt(constant):
-        less = "" if image >= constant else "clearly "
+    numbers = held_out_amplitudes(held_out)
+    if guided >= GUIDED:
         yield Caution(
-            "attenuation", f"Attenuation not {less}better than a constant: {held_out_amplitudes(held_out)}."
+            "attenuation",
+            "Attenuation not better than a constant: first arrivals follow a thin fast layer, and an image "
+            f"explains their amplitudes in wrong places{numbers and f' ({numbers})'}.",
         )
+    elif image > 0.0 and math.sqrt(image) > CLEARLY * math.sqrt(constant):
+        less = "" if image >= constant else "clearly "
+        yield Caution("attenuation", f"Attenuation not {less}better than a constant: {numbers}.")
 
 
 def held_out_amplitudes(held_out: Floats) -> str:

@@ -195,7 +195,7 @@ def _assembled(
     losses = [value for graph in graphs if (value := graph.value_of(solve_attenuation)) is not None]
     spread = [graph.value_of(estimate_uncertainty) for graph in graphs]
     complete = all(item is not None for item in spread)
-    held_out = np.sum([value.held_out for value in losses], axis=0)
+    held_out = np.sum([np.zeros(3), *(value.held_out for value in losses)], axis=0)
     experimental = {}
     if losses:
         experimental["attenuation"] = "; ".join(filter(None, (EXPERIMENTAL, held_out_amplitudes(held_out))))
@@ -207,7 +207,7 @@ def _assembled(
     cautions += fit_cautions(dataset, settings, residuals, history)
     if complete and any(item.caution for item in spread):
         cautions.append(Caution("uncertainty", _of_slices([item.caution for item in spread])))
-    cautions += attenuation_cautions(held_out) if losses else ()
+    cautions += attenuation_cautions(held_out, max((value.guided for value in losses), default=0.0))
     return Reconstruction(
         speed=speed,
         coverage=coverage,

@@ -16,13 +16,14 @@ from .attenuation import Losses
 from .finite_frequency import width_in_nodes
 from .gauss_newton import gauss_newton_step
 from .gauss_newton.gauss_newton_step import Iterate
-from .gauss_newton.linearisation import Rows
+from .gauss_newton.linearisation import Rows, ray_density
 from .grid_schedule import initial_slowness
 from .problem import Problem
 from .result import Iteration, Progress
 from .sart.sart_step import State
 from .scan import Scan
 from .stage_graphs import GaussNewtonStage, SartStage, Stage, batches_of, trace_rays
+from .uncertainty.model_errors import ModelErrors
 from .uncertainty.ray_uncertainty import Uncertainty, ray_uncertainty
 
 
@@ -246,15 +247,20 @@ def trace_attenuation_rays(scan: Scan, index: int, slowness: Floats, batch: int)
     return attenuation.trace_rays(problem, scan.stages()[-1], slowness, emitters)
 
 
-def solve_attenuation(scan: Scan, index: int, _slowness: Floats, rows: list[Rows]) -> Losses:
-    """Task: the attenuation image, and the misfits of held-out views."""
+def solve_attenuation(scan: Scan, index: int, slowness: Floats, rows: list[Rows]) -> Losses:
+    """Task: the attenuation image, and what shows whether it is better than a constant."""
     problem, settings = scan.problem(index), scan.stages()[-1]
     image = attenuation.solve(problem, settings, rows)
+    if not (rows and problem.region.any()):
+        return Losses(image, np.zeros(3))
+    density = ray_density(problem, rows)
+    grid = problem.spacing, problem.water_speed
+    guided = ModelErrors.from_misfit(1.0 / slowness, problem.region, density, 0.0, 0.0, *grid).guided
     parts = [_rays_of(scan._replace(part=part), index, problem) for part in ("shown", "views")]
     # Behind a caustic pairs have no ray.
     if not all(part.any() and part.size == sum(block.residual.size for block in rows) for part in parts):
-        return Losses(image, np.zeros(3))
-    return Losses(image, attenuation.validate(problem, settings, rows, *parts))
+        return Losses(image, np.zeros(3), guided)
+    return Losses(image, attenuation.validate(problem, settings, rows, *parts), guided)
 
 
 def _rays_of(part: Scan, index: int, whole: Problem) -> Flags:

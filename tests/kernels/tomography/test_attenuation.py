@@ -11,9 +11,13 @@ from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Problem, Settings, reconstruct, rmse
-from bentray_kernels.tomography.attenuation import trace_rays, validate
+from bentray_kernels.tomography.attenuation import active_emitters, trace_rays, validate
 from bentray_kernels.tomography.attenuation_sart import solve
 from bentray_kernels.tomography.focusing import focusing
+from bentray_kernels.tomography.reconstruction_graph import solve_attenuation
+from bentray_kernels.tomography.scan import MemorySource, Scan
+from bentray_kernels.tomography.stage_graphs import batches_of
+from bentray_kernels.tomography.uncertainty.model_errors import GUIDED
 
 from ...table6 import table6_scan
 from .gauss_newton.test_linear_problem import rows_of
@@ -203,6 +207,21 @@ def test_an_image_that_predicts_amplitudes_no_better_than_a_constant_is_doubted(
     )
     assert "held-out" not in near.provenance["attenuation"]
     assert near.caution("attenuation") == ""
+
+
+def test_an_image_of_amplitudes_along_a_thin_fast_layer_is_doubted(scan):
+    """Rays through a ring of 1650 m/s gather in it, and predict each other."""
+    whole = Scan(MemorySource(scan), plan())
+    problem = whole.problem(0)
+    away = np.hypot(*(np.indices(problem.region.shape) - 0.5 * (NODES - 1)))
+    layer = np.where(np.abs(away - 0.33 * NODES) < 1.5, 1650.0, WATER)
+    for speed, guided in ((layer, True), (PHANTOM.speed(NODES, SIDE), False)):
+        rows = [
+            trace_rays(problem, plan(), 1.0 / speed, part) for part in batches_of(active_emitters(problem))
+        ]
+        losses = solve_attenuation(whole, 0, 1.0 / speed, rows)
+        assert (losses.guided >= GUIDED) is guided
+        assert losses.held_out[1] < losses.held_out[2]
 
 
 @pytest.mark.parametrize("solver", ["penalised", "sart"])

@@ -137,8 +137,11 @@ def test_an_attenuation_must_be_clearly_better_than_a_constant(part: float, less
     numbers = f"held-out amplitudes {0.868589 * part:.3g} dB against 0.869 dB."
     text = f"Attenuation not {less}better than a constant: {numbers}"
     expected = [] if less is None else [Caution("attenuation", text)]
-    assert [*attenuation_cautions(held_out)] == expected
-    assert not [*attenuation_cautions(np.zeros(3))]
+    assert [*attenuation_cautions(held_out, 0.1)] == expected
+    assert not [*attenuation_cautions(np.zeros(3), 0.1)]
+    (layer,) = attenuation_cautions(held_out, 0.5)
+    assert layer.text.startswith("Attenuation not better than a constant: first arrivals follow a thin fast")
+    assert layer.text.endswith(f"in wrong places ({numbers[:-1]}).")
 
 
 @pytest.mark.real

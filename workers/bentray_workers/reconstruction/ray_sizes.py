@@ -125,7 +125,8 @@ def ray_task_sizes(scan: Summary, settings: Settings) -> Sizes:
         sizes["update_sart"] = TaskSize(kind, {**data, **front(settings)})
     if settings.attenuation.enabled and scan.amplitudes:
         sizes["trace_attenuation_rays"] = tracing(settings)
-        sizes["solve_attenuation"] = solving
+        # Validation copies the rays of training and of held-out pairs.
+        sizes["solve_attenuation"] = solving._replace(counts={**held, "rays": 2 * held["rays"]})
     if settings.resolution_check:
         sizes["trace_final_rays"] = tracing(settings)
         sizes["check_resolution"] = solving
