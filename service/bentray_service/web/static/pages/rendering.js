@@ -143,7 +143,7 @@ const VIEWS = { planes: "Planes", surface: "Surface" };
 // A volume in planes across its axes, in the viewer of results; query: of the address.
 function Planes({ volume, query }) {
   const [state] = useState(() => ({ ...stateOf(query), ...(query.get("view") !== "planes" && { planes: true }) }));
-  const [panes] = useState(() => [{ title: titleOf(volume), values: new Values(volume), stored: [volume.source === "upload" ? "value" : "speed"] }]);
+  const [panes] = useState(() => [{ title: titleOf(volume), values: new Values(volume), notes: {}, stored: [volume.source === "upload" ? "value" : "speed"] }]);
   return html`<${Viewer} panes=${panes} state=${state} keep=${(view) => keepQuery(new URLSearchParams([["view", "planes"], ...view]))} id="planes" aria-label="Planes" />`;
 }
 
