@@ -17,10 +17,12 @@ from bentray_kernels.acquisition.quality.correction import apply
 from bentray_kernels.acquisition.quality.element_errors import _robust_fit
 from bentray_kernels.acquisition.quality.polarity import MIN_PAIRS, _majority
 from bentray_kernels.acquisition.quality.swapped import _exchanged
+from bentray_kernels.acquisition.quality.time_zero import find_time_shift
 from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.wave.medium import Medium
 from bentray_kernels.wave.simulation import simulate
 
+from ...straight_scans import ring_scan
 from ..traces import later
 
 ELEMENTS, RADIUS_M, WATER_MPS, FREQUENCY_HZ = 32, 0.024, 1500.0, 4e5
@@ -241,3 +243,26 @@ def test_amplitudes_are_freed_of_distance_emitter_and_receiver():
     ratio = _log_ratio(dataset, SimpleNamespace(peak=peak))
     np.testing.assert_array_equal(np.isnan(ratio), ~(peak > 0.0))
     np.testing.assert_allclose(ratio[np.isfinite(ratio)], 0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("shift_s", "scatter_s", "along_s_m", "found"),
+    [
+        (1.9e-7, 0.0, 0.0, []),
+        (2.1e-7, 0.0, 0.0, [("corrected", "pairs)")]),
+        (3.2e-5, 0.0, 0.0, [("corrected", "pairs)")]),
+        (3.4e-5, 0.0, 0.0, [("refused", "more than a wrong time zero can be (33.3 µs")]),
+        (1e-5, 5e-6, 0.0, [("reported", "scatter by")]),
+        (0.0, 0.0, 4e-5, [("reported", "grow with the distance")]),
+        (0.0, 1e-5, 0.0, []),
+    ],
+)
+def test_an_offset_is_corrected_only_if_it_can_be_a_time_zero(shift_s, scatter_s, along_s_m, found):
+    """Pairs that miss the object, at 500 kHz in a ring 0.2 m wide, which sound crosses in 133 µs."""
+    dataset = ring_scan(64, 0.1, center_frequency_hz=5e5)
+    noise = np.random.default_rng(0).normal(0.0, scatter_s, (64, 64))
+    findings = [*find_time_shift(dataset, shift_s + noise + along_s_m * dataset.distance_m())]
+    assert [one.action for one in findings] == [action for action, _ in found]
+    assert all(words in one.found for one, (_, words) in zip(findings, found, strict=True))
+    few = np.where(np.arange(64) < 5, shift_s, np.nan)[:, None] * np.where(np.arange(64) == 5, 1.0, np.nan)
+    assert not [*find_time_shift(dataset, few)]
