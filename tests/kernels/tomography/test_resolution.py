@@ -56,6 +56,14 @@ def test_recovery_is_computed_only_on_request(everywhere):
     assert np.array_equal(plain.speed, everywhere.speed)
 
 
+def test_the_deviation_of_a_result_is_that_of_nodes_that_may_change(everywhere):
+    assert everywhere.uncertainty_rms_mps is None
+    for inside, expected in ((np.array([3.0, -4.0]), np.sqrt(12.5)), (np.zeros(2), 0.0)):
+        deviation = np.zeros_like(everywhere.speed)
+        deviation[20, 20:22] = inside
+        assert replace(everywhere, uncertainty=deviation).uncertainty_rms_mps == pytest.approx(expected)
+
+
 def test_residuals_are_counted(everywhere):
     assert everywhere.residuals.sum() == 96 * (96 - 1)
     middle = len(everywhere.residuals) // 2
