@@ -382,7 +382,7 @@ def jobs_page() -> Image.Image:
 
 def rendering_page() -> Image.Image:
     """The page of volume rendering, with a ball with two holes as glass."""
-    with _service() as service, browser((1400, 1060)) as page:
+    with _service() as service, browser((1400, 1160)) as page:
         volume = io.BytesIO()
         np.save(volume, np.round(255.0 * sampled(TWO_HOLES, 96)).astype(np.uint8))
         made = _stored(service, "/v1/volumes?title=Ball with two holes", volume.getvalue())

@@ -120,8 +120,9 @@ def test_threads_draw_the_same_picture(folder):
     np.testing.assert_array_equal(three.image, first.image)
 
 
-def test_tiles_equal_parts_of_the_whole(folder, cluster, monkeypatch):
-    view = FieldView(**SIZE, rays=2)
+@pytest.mark.parametrize("mode", ["reflect", "refract"])
+def test_tiles_equal_parts_of_the_whole(folder, cluster, monkeypatch, mode):
+    view = FieldView(**SIZE, rays=2, mode=mode)
     whole = picture_png(folder, view)
     parts = [tile_image(folder, view, first, first + 8) for first in range(0, 40, 8)]
     off = np.abs(np.concatenate([part.image for part in parts]).astype(int) - pixels_of(whole)).max(axis=2)

@@ -33,15 +33,10 @@ def cone(count=400):
     return TriangleMesh(np.vstack([rim, [(0.2, 0.0, 1.5), (0.0, 0.0, 0.0)]]), faces.astype(np.int32))
 
 
-def turned(points, axis):
-    """The same with what was up along another axis."""
-    return points @ UPRIGHT[axis]
-
-
 @pytest.mark.parametrize("axis", UPRIGHT)
 def test_an_object_stands_on_its_base(tmp_path, axis):
     upright = cone()
-    leaning = TriangleMesh(turned(upright.vertices, axis), upright.faces)
+    leaning = TriangleMesh(upright.vertices @ UPRIGHT[axis], upright.faces)
     assert standing_axis(leaning.vertices) == axis
     for folder in ("upright", "leaning"):
         (tmp_path / folder).mkdir()
