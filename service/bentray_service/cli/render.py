@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 ACCEPTED = "a volume: NumPy, NRRD, NIfTI, HDF5 of Bentray, or raw with --shape and --dtype"
 # Size of the tile of a thread: rows, fewer with many rays, since Ctrl-C waits for tiles in progress.
-ROWS, RAYS = 16, 2**15
+ROWS, RAYS = 32, 2**15
 # Side of the cube of a phantom.
 PHANTOM_SIDE_M = 0.1
 

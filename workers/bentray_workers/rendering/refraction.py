@@ -119,8 +119,8 @@ def _draw_tile(
     scene: Scene, view: RefractionView, rows_drawn: tuple[int, int], card: Colours | None, threads: int
 ) -> Tile:
     first, last = rows_drawn
-    # Post-refraction supersampling uses the adjacent rows, and edges are smoothed twice.
-    smooth = view.mode == "refract" and view.supersampling != "none"
+    # Post-refraction supersampling uses the adjacent rows, and smooths edges twice.
+    smooth = view.mode == "refract" and view.supersampling == "prss"
     margin = 3 if smooth else 0
     top, bottom = max(first - margin, 0), min(last + margin, view.height)
     camera = part_of(camera_of(scene, view), top / view.height, bottom / view.height)

@@ -117,8 +117,8 @@ class RefractionView:
     )
     supersampling: Literal["none", "prss", "real"] = setting(
         "prss",
-        "prss: more samples of the backdrop after refraction; real: more rays; both smooth glass where "
-        "neighbouring rays take other paths.",
+        "prss: more samples of the backdrop after refraction, smoothed where neighbouring rays take other "
+        "paths; real: more rays.",
         words={"prss": "PRSS", "real": "more rays"},
     )
     degree: int = setting(
