@@ -1,4 +1,4 @@
-"""Simulated ring scan of the 2-D breast phantom (Table 6) with absorption."""
+"""Simulated ring scan of a breast phantom (Tables 6 and 7) with absorption."""
 
 import os
 from concurrent.futures import ThreadPoolExecutor
@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from bentray_kernels.acquisition import Dataset, Waveform
-from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.wave.medium import Medium
 from bentray_kernels.wave.simulation import simulate
 from bentray_service.cli.output.terminal import Step
@@ -26,7 +25,9 @@ from ._absorption import Absorbing, simulate_absorbed
 TABLE6_HZ = 5e6
 
 
-def lossy_scan(settings: WaveSimulationSettings, progress: Step, *, proportional: bool) -> Dataset:
+def lossy_scan(
+    settings: WaveSimulationSettings, progress: Step, *, proportional: bool, reference_hz: float = TABLE6_HZ
+) -> Dataset:
     """Noise-free traces of object and water, with another grid and order than any inversion.
 
     Args:
@@ -34,10 +35,11 @@ def lossy_scan(settings: WaveSimulationSettings, progress: Step, *, proportional
         progress: called for emissions.
         proportional: whether the loss is proportional to the frequency, as in tissue; else it is constant, as
             in the model of the inversion.
+        reference_hz: frequency at which the phantom has the loss of its table.
     """
-    phantom, nodes = table6(settings.coupling_mps), settings.fine_nodes
-    ratio = settings.frequency_hz / TABLE6_HZ
-    speed, loss = phantom.speed(nodes, TABLE6_SIDE_M), ratio * phantom.attenuation(nodes, TABLE6_SIDE_M)
+    phantom, nodes, side = settings.phantom, settings.fine_nodes, settings.phantom_side_m
+    ratio = settings.frequency_hz / reference_hz
+    speed, loss = settings.speed(), ratio * phantom.attenuation(nodes, side)
     grid, made = (settings.spacing_m, settings.step_s), {"edge_nodes": EDGE_NODES, "order": ORDER}
     water = Medium.from_speed(np.full_like(speed, settings.coupling_mps), *grid, **made)
     tissue: Medium | Absorbing
@@ -68,5 +70,5 @@ def lossy_scan(settings: WaveSimulationSettings, progress: Step, *, proportional
             progress(k, settings.emissions, "simulating waves with loss")
     scan = scan_of(settings, Waveform(traces[0], traces[1]))
     assert scan.truth is not None
-    losses = ratio * phantom.attenuation(settings.nodes, TABLE6_SIDE_M)
+    losses = ratio * phantom.attenuation(settings.nodes, side)
     return replace(scan, truth=replace(scan.truth, attenuation_np_m=losses), source="", title="")

@@ -142,8 +142,8 @@ def rows_knowing_skin(scan: PhantomScan, data: Data, nodes: int) -> Iterator[Row
         yield compared.row(target, compared.error, BENT, "<=", "of range", detail)
 
 
-def scanned(data: Data, nodes: int, elements: int) -> PhantomScan:
-    """The slice at the centre, scanned as stated."""
+def scanned(data: Data, nodes: int, elements: int, *, losses: bool = False) -> PhantomScan:
+    """The slice at the centre, scanned as stated; ``losses``: with amplitudes of first arrivals."""
     skin, coupling, times, snr = data
     ring = Ring(elements, ring_radius(TABLE7_SIDE_M, nodes))
     scan = TravelTimeScan(varied(coupling, skin).at(0.0), ring, TABLE7_SIDE_M, nodes)
@@ -153,13 +153,15 @@ def scanned(data: Data, nodes: int, elements: int) -> PhantomScan:
         )
         return PhantomScan(scan, pick(simulate(waves)), silent)
     everyone = np.arange(elements)
-    medium, positions = scan.medium(), scan.elements()
+    medium, positions = scan.medium(attenuation=losses), scan.elements()
     with ThreadPoolExecutor(cpu_count()) as pool:
         batches = np.array_split(everyone, elements // 8)
-        delta = np.concatenate(list(pool.map(lambda batch: medium.arrivals(positions, batch)[0], batches)))
+        parts = list(pool.map(lambda batch: medium.arrivals(positions, batch), batches))
+    delta = np.concatenate([part for part, _ in parts])
+    ratio = np.concatenate([part for _, part in parts if part is not None]) if losses else None
     if snr is not None:
         delta, _ = with_noise(delta, snr, np.random.default_rng(0), ~np.eye(elements, dtype=bool))
-    dataset = Dataset(ring.positions(), everyone, everyone, coupling, delta_tof_s=delta)
+    dataset = Dataset(ring.positions(), everyone, everyone, coupling, delta_tof_s=delta, log_ratio_np=ratio)
     return PhantomScan(scan, dataset, silent)
 
 
