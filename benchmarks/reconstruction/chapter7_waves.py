@@ -28,7 +28,8 @@ VISIBLE, SMALLEST_VOXELS = 0.5, 2
 
 WATER_MPS = 1500.0
 
-# The frequency was chosen on the slice at the centre; others, of the 40 heights, judge it.
+# The frequency was chosen on the slice at the centre; others, of the 40 heights, judge it. The curvature that
+# a band of frequency begins with was chosen on that at -13.4 mm among others.
 # A slice takes eight minutes of an idle core, so that not all are measured.
 CENTRE_M, HEIGHTS, JUDGED = 0.0, 40, (11,)
 

@@ -23,7 +23,7 @@ COMPUTED = {
     "published_systems", "scaling", "scoreboard", "sizing", "subdomains", "table5", "task_memory",
 }  # fmt: skip
 # In results of devices, their names.
-NAMES = {"portable", "computing", "language", "pthread", "intel", "xeon", "processor"}
+NAMES = {"portable", "computing", "language", "pthread", "intel", "xeon", "processor", "epyc"}
 # Words of the product in rows that were not measured since it says them otherwise.
 FORMER = {"curved": "bent since 2026-11-27"}
 WORD = re.compile(r"[a-z]{4,}")
