@@ -201,6 +201,11 @@ def test_the_truth_of_a_scan(result: Result, simulated: bentray.Scan) -> None:
         replace(result, truth=None).compare()
     with pytest.raises(bentray.InvalidInput, match="quantity: found 'attenuation'; accepted: one of speed"):
         result.compare(quantity="attenuation")
+    losses = np.linspace(0.0, 5.0, 144).reshape(12, 12)
+    known = replace(result, truth=replace(truth(nodes=12), attenuation_np_m=losses))
+    compared = known.compare(quantity="attenuation")
+    np.testing.assert_allclose(compared.other, losses)
+    np.testing.assert_array_equal(compared.image, result.attenuation)
 
 
 def test_a_comparison_is_drawn(result: Result) -> None:
