@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple
 # How the file of a reconstruction names itself: here, to be known without loading what makes one.
 FORMAT, VERSION = "bentray-reconstruction", "1.0"
 
-QuantityName = Literal["speed", "coverage", "attenuation", "recovery", "uncertainty", "reflection"]
+QuantityName = Literal["speed", "coverage", "recovery", "uncertainty", "reflection", "attenuation"]
 
 
 class Quantity(NamedTuple):
