@@ -72,7 +72,7 @@ def test_errors_are_shown_as_text(page, address, tmp_path):
     page.get_by_role("heading", name="openUSCT (HDF5)").wait_for()
 
 
-def test_a_volume_and_a_mesh_open_on_their_own_pages(page, address, tmp_path):
+def test_a_volume_a_mesh_and_a_scan_open_on_their_own_pages(page, address, scan):
     content = io.BytesIO()
     np.savez(content, volume=np.round(200.0 * sampled(ONE_HOLE, 12)).astype(np.uint8))
     page.goto(address)
@@ -89,6 +89,8 @@ def test_a_volume_and_a_mesh_open_on_their_own_pages(page, address, tmp_path):
     assert "#/surfaces/mesh-" in page.url
     drop(page, "#mesh-drop", ring=mesh[:200], suffix=".ply")
     expect(page.locator("#mesh-error")).to_contain_text("ring.ply is not a mesh that can be read. ")
+    drop(page, "#mesh-drop", scan=scan().read_bytes())
+    page.get_by_role("heading", name="Sixteen elements").wait_for()
 
 
 @pytest.mark.nightly

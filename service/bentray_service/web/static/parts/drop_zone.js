@@ -20,7 +20,7 @@ async function kindsOf(file, own) {
   const all = Object.keys(KINDS).sort((a, b) => (b === own) - (a === own));
   const named = all.filter((kind) => KINDS[kind].names.test(file.name));
   if (named.length) return named;
-  const start = new TextDecoder("latin1").decode(await file.slice(0, START_BYTES).arrayBuffer());
+  const start = String.fromCharCode(...new Uint8Array(await file.slice(0, START_BYTES).arrayBuffer()));
   return all.filter((kind) => KINDS[kind].starts.test(start));
 }
 
@@ -30,8 +30,7 @@ async function store(file, metadata, onProgress) {
   let refusal = null;
   for (const kind of kinds.length ? kinds : [metadata.kind]) {
     try {
-      const stated = kind === metadata.kind ? metadata : { kind, title: file.name.slice(0, 200) };
-      return { kind, record: await resumableUpload(file, stated, onProgress) };
+      return { kind, record: await resumableUpload(file, kind === metadata.kind ? metadata : { kind }, onProgress) };
     } catch (error) {
       if (!error.problem) throw error;
       refusal ??= error;
