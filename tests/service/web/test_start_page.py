@@ -81,7 +81,6 @@ def test_a_volume_a_mesh_and_a_scan_open_on_their_own_pages(page, address, scan)
     drop(page, "#scan-drop", ball=content.getvalue(), suffix=".npz")
     page.locator(".readout").wait_for()
     assert "#/rendering/vol-" in page.url
-    page.locator("#volume-drop").wait_for()
     ring = torus(12, 8)
     mesh = trimesh.Trimesh(ring.vertices, ring.faces, process=False).export(file_type="ply")
     drop(page, "#volume-drop", ring=mesh, suffix="")

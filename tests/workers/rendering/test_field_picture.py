@@ -59,8 +59,7 @@ def test_every_field_changes_the_picture(folder, name):
     values = CHOICES.get(name, (getattr(FieldView(), name), numbers.get(name)))
     pictures = [drawn(folder, **{**plain, name: value}) for value in values]
     seen = {picture.tobytes() for picture in pictures}
-    # Rays that refract walk within the ring: of the lookups only those from outside differ there. The ring
-    # stands on z.
+    # Rays walk within the ring: of the lookups only those from outside differ there. It stands on z.
     assert len(seen) >= (2 if name in ("lookup", "eye") else len(values) - (name == "up"))
 
 
