@@ -88,8 +88,16 @@ CASES = (
         )
         for water in (1375, 1500)
     ),
-    Case("Figure 34, slices", "reconstruction_volume", "R9 exact, slices", published=0.036),
-    Case("Figure 34, 3-D", "reconstruction_volume", "R9 exact, volume", published=0.034),
+    *(
+        Case(
+            f"Figure 34, {way}, {skin}",
+            "reconstruction_volume",
+            f"R9 {skin}, {way}, whole image",
+            published=published,
+        )
+        for skin in ("skin", "no skin")
+        for way, published in (("slices", 0.036), ("in space", 0.034))
+    ),
     Case(
         "Figure 34, slices scanned by waves (tuned: waveform)",
         "chapter7_waves",

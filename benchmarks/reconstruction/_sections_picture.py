@@ -1,12 +1,10 @@
-"""Pictures of speeds on one scale: a sheet of images, and sections of volumes."""
+"""Pictures of speeds on one scale."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from bentray_kernels.acquisition import Truth
-from bentray_kernels.tomography import Reconstruction
 from bentray_workers.images.canvas import drawing, new_figure
 from bentray_workers.images.maps import SPEED, draw_bar, draw_map, robust_limits
 
@@ -41,31 +39,4 @@ def picture(title: str, panels: Sequence[Panel], columns: int, side_m: float) ->
         for axes in list(grid.flat)[len(panels) :]:
             axes.set_visible(False)
         draw_bar(maps, "sound speed (m/s)")
-        return figure_png(figure)
-
-
-def picture_of_sections(truth: Truth, results: Mapping[str, Reconstruction]) -> bytes:
-    """PNG: a column for the truth and each reconstruction, a row for each of three sections."""
-    volumes = {"truth": truth.sound_speed_mps, **{name: result.speed for name, result in results.items()}}
-    middle = [n // 2 for n in truth.sound_speed_mps.shape]
-    spacing, origin = truth.spacing_m, truth.origin_m
-    limits = robust_limits([truth.sound_speed_mps])
-    axes_of = ((0, 1, "xy"), (0, 2, "xz"), (1, 2, "yz"))
-    with drawing():
-        figure = new_figure(2.4 * len(volumes) + 1.0, 5.6)
-        figure.suptitle("3-D breast phantom (Li 2008, Table 7): sections through the middle")
-        heights = [truth.sound_speed_mps.shape[b] * spacing[b] for _, b, _ in axes_of]
-        panels = figure.subplots(3, len(volumes), squeeze=False, height_ratios=heights)
-        for column, (name, volume) in enumerate(volumes.items()):
-            maps = []
-            for row, (a, b, plane) in enumerate(axes_of):
-                third = 3 - a - b
-                image = np.take(volume, middle[third], axis=third)
-                axes = panels[row, column]
-                title = name if row == 0 else ""
-                grid = ((spacing[a], spacing[b]), (origin[a], origin[b]))
-                maps.append(draw_map(axes, image, *grid, limits, colormap=SPEED, title=title))
-                axes.set_xlabel(f"{plane[0]} (mm)" if column == 0 else "")
-                axes.set_ylabel(f"{plane[1]} (mm)" if column == 0 else "")
-        draw_bar(maps, "speed (m/s)")
         return figure_png(figure)

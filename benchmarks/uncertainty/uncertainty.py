@@ -12,7 +12,7 @@ from scipy.ndimage import gaussian_filter
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.tomography import Reconstruction, Settings, reconstruct
 from bentray_kernels.tomography.gauss_newton.gauss_newton_step import trace_rays
-from bentray_kernels.tomography.problem import Problem
+from bentray_kernels.tomography.problem import MARGIN_NODES, Problem
 from bentray_kernels.tomography.stage_graphs import batches_of
 from bentray_kernels.tomography.uncertainty.ray_uncertainty import ray_uncertainty
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
@@ -20,7 +20,7 @@ from bentray_service.cli.output.benchmark_row import Row
 from bentray_workers.simulation.simulation_run import simulate
 from bentray_workers.simulation.volume import VolumeSimulationSettings
 
-from ..reconstruction.reconstruction_volume import COUPLING_MPS, inner
+from ..reconstruction.reconstruction_volume import COUPLING_MPS
 from ._breast_scans import SEED, BreastScan, breast_scans
 from ._calibration_picture import calibration_picture
 from ._judged_image import DEVIATIONS, Judged, correlation, part_within, rms, row_of, sizes
@@ -242,10 +242,11 @@ def small_volume(context: BenchmarkContext, goal: float) -> Row:
     )
     result = reconstruct(scan, settings)
     assert result.uncertainty is not None
-    deviation = inner(replace(result, speed=result.uncertainty), SLICES).speed
+    inner = slice(MARGIN_NODES, MARGIN_NODES + SLICES)
+    deviation = result.uncertainty[..., inner]
     width = result.resolution_width_m[0] / result.spacing_m[0]
     smooth = gaussian_filter(truth.sound_speed_mps, width, mode="nearest")
     inside = (np.abs(truth.sound_speed_mps - COUPLING_MPS) > DIFFERENT_MPS) & (deviation > 0.0)
-    error, deviation = np.abs(inner(result, SLICES).speed - smooth)[inside], deviation[inside]
+    error, deviation = np.abs(result.speed[..., inner] - smooth)[inside], deviation[inside]
     about = f"{NODES}² by {SLICES} nodes, {ELEMENTS} elements at each height, SNR {SNR:g}"
     return row_of("U1 small volume in 3-D", error, deviation, goal, about)
