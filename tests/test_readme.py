@@ -103,7 +103,7 @@ def test_every_address_of_curl_is_served(tmp_path: Path) -> None:
         for path, methods_of_path in create_app(ServiceSettings(data_dir=tmp_path)).openapi()["paths"].items()
         for method in methods_of_path
     }
-    assert len(lines_of("curl")) == 15
+    assert len(lines_of("curl")) == 16
     for words in lines_of("curl"):
         stated = words[words.index("-X") + 1] if "-X" in words else None
         method = stated or ("POST" if {"-d", "--data-binary"} & set(words) else "GET")
