@@ -8,13 +8,15 @@ import pytest
 from bentray_kernels.meshes.example_surfaces import bumpy_ball, sphere, torus
 from bentray_kernels.meshes.mesh import TriangleMesh
 from bentray_kernels.requests.request_fields import choices_of
+from bentray_kernels.splines import Spline
 from bentray_workers.files.volume import Volume, write_volume
+from bentray_workers.rendering import up_axis
 from bentray_workers.rendering.field_picture import picture_png as mesh_png
 from bentray_workers.rendering.field_view import FieldView
 from bentray_workers.rendering.histogram import volume_histogram
 from bentray_workers.rendering.refraction import picture_png
 from bentray_workers.rendering.refraction_view import RefractionView
-from bentray_workers.rendering.up_axis import UPRIGHT, standing_axis
+from bentray_workers.rendering.up_axis import EXAMINED, UPRIGHT, standing_axis, standing_axis_of
 
 from ...kernels.meshes.examples import bunny
 from ..pixels import pixels_of
@@ -69,6 +71,16 @@ def test_a_volume_stands_on_its_base(tmp_path, axis):
     widths = (image != image[0, 0]).any(axis=2).sum(axis=1)
     shown = widths[widths > 0]
     assert shown[-6:].mean() > 1.5 * shown[:6].mean()
+
+
+def test_a_volume_is_examined_once_at_no_more_nodes_than_stated(monkeypatch):
+    examined = []
+    monkeypatch.setattr(up_axis, "standing_axis", lambda points: examined.append(points) or "x")
+    spline = Spline(np.ones((2 * EXAMINED - 9, 4, 4)))
+    for _ in range(2):
+        assert standing_axis_of(spline, (1e-3,) * 3) == "x"
+    (points,) = examined
+    assert 0.5 * EXAMINED <= len(np.unique(points[:, 0])) <= EXAMINED
 
 
 def test_a_ball_stands_on_z():

@@ -285,8 +285,9 @@ def _rays(view: RefractionView | FieldView) -> int:
 
 def _tile_bytes(view: RefractionView | FieldView) -> int:
     """Memory of a tile, or of the whole picture while its tiles are stacked."""
-    # At least one row, and one more on each side for post-refraction supersampling.
-    rays = min(_rays(view), max(TASK_RAYS, view.width * view.times**2)) + 2 * view.width * view.times**2
+    # At least one row, and three more of rays on each side, from which edges of glass are smoothed.
+    row = view.width * view.times**2
+    rays = min(_rays(view), max(TASK_RAYS, row)) + 2 * -(-3 // view.times) * row
     return FLOOR_BYTES + max(RAY_BYTES * rays, PIXEL_BYTES * view.width * view.height)
 
 

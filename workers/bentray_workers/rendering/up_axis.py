@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +24,11 @@ UPRIGHT: dict[UpAxis, Floats] = {
 # What lies this near to the lowest point carries the object; a base has at least this area, and so many times
 # that below z; relative to the largest extent.
 BASE_HEIGHT, BASE_AREA, TIMES_Z = 0.02, 0.1, 3.0
-# Nodes along the longest side of a volume that are examined.
+# Nodes along the longest side of a volume that are examined, at most.
 EXAMINED = 96
+
+# That of each filtered volume in memory: every tile and preview asks for it.
+_STANDING: WeakKeyDictionary[Spline, UpAxis] = WeakKeyDictionary()
 
 
 def standing_axis(points: NDArray[Any]) -> UpAxis:
@@ -51,6 +55,9 @@ def standing_axis_of(spline: Spline, spacing_m: Sequence[float] | Floats) -> UpA
 
     It is that of all iso-values, so that an object does not turn while these change.
     """
-    step = max(1, max(spline.coefficients.shape) // EXAMINED)
-    values = spline.coefficients[::step, ::step, ::step]
-    return standing_axis(np.argwhere(values >= 0.5 * (values.min() + values.max())) * np.asarray(spacing_m))
+    if spline not in _STANDING:
+        step = -(-max(spline.coefficients.shape) // EXAMINED)
+        values = spline.coefficients[::step, ::step, ::step]
+        upper = np.argwhere(values >= 0.5 * (values.min() + values.max()))
+        _STANDING[spline] = standing_axis(upper * np.asarray(spacing_m))
+    return _STANDING[spline]
