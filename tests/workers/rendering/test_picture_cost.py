@@ -6,6 +6,7 @@ import pytest
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.requests.request_fields import MAX_PIXELS
+from bentray_service.picture_queue import LONG_S
 from bentray_workers.cluster.capacities import WorkerCapacity
 from bentray_workers.rendering import picture_cost
 from bentray_workers.rendering.field_view import FieldView
@@ -58,6 +59,8 @@ def test_cost_grows_with_every_parameter():
     ):
         assert refraction_cost(stored, more).seconds > usual
     assert refraction_cost(stored, view(mode="shaded")).seconds < usual
+    # A mesh without a field may have two million faces, which are sorted first.
+    assert field_cost({"faces": 2_000_000}, FieldView(mode="diffuse")).seconds > LONG_S
 
 
 def test_rejects_pictures_larger_than_worker_memory():
