@@ -33,8 +33,8 @@ PASSES, ROBUST_PASSES = 3, 12
 # simulations, where total variation did worse (``benchmarks/results/raw_trace_experiments.md``).
 ZONES, TRACES_STRICTER = 3.0, 2.0
 
-# For validation one in so many of these solutions, and of the iterations of SART, is made. On the scans that
-# ``cautions.CLEARLY`` was chosen on, all of them gave the same verdicts.
+# For validation one in so many of these solutions is made. On the scans that ``cautions.CLEARLY`` was chosen
+# on, all of them gave the same verdicts. SART makes all iterations: after few, good images look bad.
 VALIDATED = 4
 
 # More than any tissue has at the frequencies that pass through it, Np/m.
@@ -137,7 +137,7 @@ def solve(problem: Problem, settings: Settings, blocks: Sequence[Rows], one_in: 
     Args:
         problem, settings: of the rows.
         blocks: rows.
-        one_in: the solutions or iterations are fewer by this factor.
+        one_in: the solutions at once are fewer by this factor.
 
     Returns:
         of the region's shape, Np/m, at least 0; that of the water outside the array.
@@ -152,8 +152,7 @@ def solve(problem: Problem, settings: Settings, blocks: Sequence[Rows], one_in: 
         return water / problem.spacing
     bounds = (0.0, MAX_NP_M * problem.spacing)
     if settings.numerics.attenuation_solver == "sart":
-        fewer = settings.changed(iterations=max(1, settings.iterations // one_in))
-        return attenuation_sart.solve(blocks, water, problem.region, fewer, bounds) / problem.spacing
+        return attenuation_sart.solve(blocks, water, problem.region, settings, bounds) / problem.spacing
     image, dual = water, np.zeros((len(shape), *shape))
     # Rays through a blurred speed image are all somewhat off, and none is an outlier: on Table 6 after SART
     # the limit made the error larger, after Gauss–Newton a third smaller.

@@ -51,6 +51,8 @@ def test_sart_gives_it_back_too(scan):
     constant = TRUTH[INSIDE].std()
     assert result.attenuation.min() >= 0.0
     assert results < 0.6 * constant
+    image, same = map(float, re.findall(r"(\S+) dB", result.provenance["attenuation"]))
+    assert image < 0.5 * same
     assert rmse(reconstruct(scan, sart.changed(iterations=1)).attenuation, TRUTH, INSIDE) > results
     # The order of the emitters alone depends on the seed.
     again, other = (reconstruct(scan, sart.changed(seed=seed)).attenuation for seed in (0, 1))
