@@ -39,8 +39,12 @@ def names(page):
 def test_a_link_restores_filters(page, address, queued):
     left, right, _ = queued("Left", "Right", "Left again")
     httpx.post(f"{address}{left['links']['cancel']}").raise_for_status()
+    httpx.patch(f"{address}/v1/datasets/{right['dataset']}", json={"title": "scan_" * 40}).raise_for_status()
     page.goto(f"{address}/#/jobs")
     expect(names(page)).to_have_text(["Left again", "Right", "Left"])
+    # A long word, as of a file, does not widen the page.
+    page.get_by_role("link", name="scan_").first.wait_for()
+    assert page.evaluate("document.documentElement.scrollWidth - innerWidth") <= 0
     page.get_by_label("Name, scan, notes").fill("left")
     expect(names(page)).to_have_text(["Left again", "Left"])
     page.get_by_label("State").select_option("cancelled")

@@ -61,7 +61,8 @@ def test_a_volume_is_uploaded_looked_at_and_turned(page, serve, work, tmp_path, 
     expect(page.locator(".readout")).to_contain_text("node 6, 6, 6")
     value = float(page.locator(".readout").get_attribute("data-value"))
     assert value == pytest.approx(float(sampled(ONE_HOLE, 12)[6, 6, 6]), rel=1e-6)
-    page.wait_for_url(re.compile("view=planes"))
+    page.get_by_label("Between nodes").select_option("linear")
+    page.wait_for_url(re.compile("#/rendering/vol-.*view=planes.*interpolation=linear"))
     expect(page.get_by_label("Iso-value", exact=True)).to_be_hidden()
     page.get_by_role("button", name="Surface", exact=True).click()
     image = page.get_by_role("img", name="Volume rendering of ball.npy")
@@ -82,6 +83,10 @@ def test_a_volume_is_uploaded_looked_at_and_turned(page, serve, work, tmp_path, 
     job = page.locator(".job")
     job.get_by_text("7 frames of 512").wait_for()
     job.get_by_text("ball.npy").wait_for()
+    # The view of the planes is kept beside the surface.
+    page.get_by_role("button", name="Planes", exact=True).click()
+    expect(page.get_by_label("Between nodes")).to_have_value("linear")
+    page.get_by_role("button", name="Surface", exact=True).click()
     link = job.get_by_role("link", name="Frames")
     with page.expect_download() as download:
         link.click()

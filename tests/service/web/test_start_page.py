@@ -60,7 +60,10 @@ def test_scans_are_found_by_their_names_and_read_in_pages(page, serve, scan):
 
 def test_errors_are_shown_as_text(page, address, tmp_path):
     (tmp_path / "notes.h5").write_text("only text")
+    (tmp_path / "empty.h5").touch()
     page.goto(address)
+    page.set_input_files("#scan-file", tmp_path / "empty.h5")
+    expect(page.locator("#scan-error")).to_have_text("empty.h5 is empty.")
     page.set_input_files("#scan-file", tmp_path / "notes.h5")
     alert = page.locator("#scan-error")
     found = "Found a file that is not HDF5 (it begins with 'only tex'); accepted: a scan in HDF5, MATLAB "
@@ -175,7 +178,7 @@ def test_an_upload_goes_on_after_a_broken_connection_and_is_listed(page, address
     page.get_by_role("link", name="Scans", exact=True).click()
     renamed_in_place(page, page.locator("#scans li").first, "Sixteen elements", "**/v1/datasets/*")
     page.get_by_role("link", name="Another name").first.click()
-    page.get_by_text("16 emitters").wait_for()
+    expect(page.locator("#dataset-facts")).to_contain_text("16 emitters")
     assert file.stat().st_size > 3 * 4096
     assert sent[:3] == [0, 4096, 4096]
     assert sent[-1] == (file.stat().st_size - 1) // 4096 * 4096

@@ -115,6 +115,7 @@ def test_the_whole_story_by_keyboard_alone(page, service, breast, tmp_path):
     press(page.locator(".export summary"))
     with page.expect_download() as download:
         press(page.locator(".export").get_by_role("link", name="NumPy"))
+    assert download.value.suggested_filename.endswith("-speed.npy")
     values = np.load(download.value.path())
     page.keyboard.press("Escape")
     expect(page.locator(".export summary")).to_be_focused()

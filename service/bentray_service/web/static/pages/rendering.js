@@ -140,18 +140,22 @@ function Fields({ volume, histogram, marks, fields, onSlide }) {
 
 const VIEWS = { planes: "Planes", surface: "Surface" };
 
-// A volume in planes across its axes, in the viewer of results; query: of the address.
-function Planes({ volume, query }) {
-  const [state] = useState(() => ({ ...stateOf(query), ...(query.get("view") !== "planes" && { planes: true }) }));
+// A volume in planes across its axes, in the viewer of results; view: { current }, the query of its address, which is kept there while the surface is shown.
+function Planes({ volume, view }) {
+  const [state] = useState(() => ({ ...stateOf(view.current), ...(view.current.get("view") !== "planes" && { planes: true }) }));
   const [panes] = useState(() => [{ title: titleOf(volume), values: new Values(volume), notes: {}, stored: [volume.source === "upload" ? "value" : "speed"] }]);
-  return html`<${Viewer} panes=${panes} state=${state} keep=${(view) => keepQuery(new URLSearchParams([["view", "planes"], ...view]))} id="planes" aria-label="Planes" />`;
+  const keep = (query) => {
+    view.current = new URLSearchParams([["view", "planes"], ...query]);
+    keepQuery(view.current);
+  };
+  return html`<${Viewer} panes=${panes} state=${state} keep=${keep} id="planes" aria-label="Planes" />`;
 }
 
 // fields: of the form, as schemas by name.
 function Rendering({ volumes, id, query, fields }) {
   const [marks, setMarks] = useState([]);
   const [link, setLink] = useState("");
-  const ended = useRef(null);
+  const [ended, planes] = [useRef(null), useRef(query)];
   const [local] = useState(localPreviews);
   const [planWords, plan, forgetPlan] = usePlan();
   const scene = useScene({ records: volumes, id, query, pictureOf });
@@ -189,10 +193,11 @@ function Rendering({ volumes, id, query, fields }) {
     if (histogram) setMarks(isoValuesOf(viewOf(volume, values()), histogram));
   }, [histogram]);
 
-  // The values of the form belong to the volume before it.
+  // The values of the form, and the planes, belong to the volume before it.
   async function onStored({ id: name, links }) {
     if (!links.refraction) throw new Error("The volume is stored, but it cannot be rendered: its spacing is not uniform.");
     form.current.reset();
+    planes.current = new URLSearchParams();
     scene.setRecords(await loadVolumes());
     scene.choose(name);
     setShown("planes");
@@ -223,7 +228,7 @@ function Rendering({ volumes, id, query, fields }) {
     stage=${{ id: "glass", words: WORDS, hint: "The image appears here", describe, onShown: readHistogram, onError }}
     formats="NumPy (.npy, .npz), NRRD, NIfTI or HDF5 of Bentray" none="No 3-D volume yet" form="look" products=${products}
     above=${volume && html`<${ChoiceBar} label="View" className="views" entries=${Object.entries(VIEWS)} chosen=${shown} onChoose=${setShown} />`}
-    instead=${inPlanes && html`<${Planes} key=${volume.id} volume=${volume} query=${query} />`}
+    instead=${inPlanes && html`<${Planes} key=${volume.id} volume=${volume} view=${planes} />`}
     facts=${volume && `${volume.shape.join(" × ")} nodes · values ${volume.value_range.map(rounded).join(" to ")} ${volume.unit}`}
     fields=${html`<${Fields} volume=${volume} histogram=${histogram} marks=${marks} fields=${fields} onSlide=${slide} />`}
     begin=${{ id: "turn", title: "Render a turntable", job: turntable }}
@@ -237,6 +242,6 @@ const loadVolumes = async () => (await load("volumes")).filter((volume) => volum
 
 export async function open({ id, query }) {
   document.title = "Volume rendering – Bentray";
-  const [volumes, fields] = await Promise.all([loadVolumes(), propertiesOf("Turntable")]);
+  const [volumes, fields] = await Promise.all([loadVolumes(), propertiesOf("Turntable"), id && request(`/v1/volumes/${id}`)]);
   return html`<${Rendering} volumes=${volumes} id=${id} query=${query} fields=${fields} />`;
 }

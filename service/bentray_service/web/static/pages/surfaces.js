@@ -16,7 +16,7 @@ const FIELDS = ["mode", "scene", "lookup", "up", "index", "share", ...CAMERA, "s
 function factsOf({ faces, closed, holes, genus, repairs }) {
   const form = closed ? "closed" : counted(holes, "hole", "holes");
   const mended = Object.values(repairs).some((count) => count > 0) ? " · mended" : "";
-  return `${faces} faces · ${form} · ${counted(genus, "handle", "handles")}${mended}`;
+  return `${counted(faces, "face", "faces")} · ${form} · ${counted(genus, "handle", "handles")}${mended}`;
 }
 
 // Below this share rounding decides.
@@ -164,6 +164,7 @@ export async function open({ id, query }) {
   document.title = "Surface rendering – Bentray";
   const [meshes, { geometry_fields: records }, { samples }, view] = await Promise.all([
     load("meshes"), request("/v1/geometry-fields?limit=1000"), propertiesOf("FieldSettings"), parametersOf("/v1/geometry-fields/{field_id}/image.png"),
+    id && request(`/v1/meshes/${id}`),
   ]);
   // Records are the newest first.
   const built = Object.fromEntries(records.reverse().map(({ mesh, links }) => [mesh, { ...links, field: links.self }]));

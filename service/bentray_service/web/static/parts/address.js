@@ -11,9 +11,9 @@ export function go(path) {
   else location.hash = `#${path}`;
 }
 
-// State the view in the address, without a step in the history and without opening the page again.
-export function keepQuery(query) {
-  history.replaceState(history.state, "", linkTo(parse(location.hash).path, query));
+// State the view in the address, and the path if it is another one, without a step in the history and without opening the page again.
+export function keepQuery(query, path = parse(location.hash).path) {
+  history.replaceState(history.state, "", linkTo(path, query));
 }
 
 // Some parameters of an address.

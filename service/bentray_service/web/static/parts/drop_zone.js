@@ -26,6 +26,7 @@ async function kindsOf(file, own) {
 
 // Stores a file: { kind, record }. metadata: of a file of the kind that it states.
 async function store(file, metadata, onProgress) {
+  if (!file.size) throw new Error(`${file.name} is empty.`);
   const kinds = await kindsOf(file, metadata.kind);
   let refusal = null;
   for (const kind of kinds.length ? kinds : [metadata.kind]) {

@@ -30,14 +30,12 @@ export function Picture({ address, onShown = () => {}, onError = () => {}, ...mo
     onError=${onError} ...${more} />`;
 }
 
-const ENDINGS = { "image/png": ".png", "image/apng": ".png", "application/zip": ".zip", "application/x-hdf5": ".h5" };
-
+// Under the name that the service states, as a browser does for a link.
 async function save(address) {
-  const blob = await blobOf(address);
+  const response = await respond(address);
+  const [, stated] = /filename="(.+)"/.exec(response.headers.get("Content-Disposition")) ?? [];
   const path = address.split("?")[0].split("/");
-  const format = new URLSearchParams(address.split("?")[1]).get("format");
-  const ending = path.at(-1).includes(".") ? "" : ENDINGS[blob.type] || (format ? `.${format}` : ".json");
-  saveBlob(blob, `${path.slice(-2).join("-")}${ending}`);
+  saveBlob(await response.blob(), stated ?? `${path.slice(-2).join("-")}${path.at(-1).includes(".") ? "" : ".json"}`);
 }
 
 export function saveBlob(blob, name) {

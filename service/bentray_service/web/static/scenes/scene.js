@@ -1,6 +1,6 @@
 // What the pages of volume and surface rendering share: the picture of a view, its camera, the form of the view, and what is rendered.
 import { JobList } from "../jobs/job_cards.js";
-import { go } from "../parts/address.js";
+import { go, keepQuery, parse } from "../parts/address.js";
 import { send } from "../parts/api.js";
 import { DropZone } from "../parts/drop_zone.js";
 import { deleteRecord, titleOf } from "../parts/lists.js";
@@ -150,6 +150,8 @@ function Stage({ id, words, hint, describe, onShown = () => {}, onError, camera,
 export function ScenePage(props) {
   const { scene, title, name, path, stage, above, instead, below, formats, none, onStored, facts, form, onChange, fields, begin, products, actions, jobs, children } = props;
   const { record, records, act, camera } = scene;
+  // The newest one is shown by a page that was opened without an id, and after an upload.
+  useEffect(() => record && keepQuery(parse(location.hash).query, `${path}/${record.id}`), [record?.id]);
   const entries = records.length ? records.map((one) => [one.id, `${titleOf(one)} (${inTime(one.created)})`]) : [["", none]];
   const start = () => act(async () => {
     await send("POST", "/v1/jobs", begin.job());
