@@ -86,6 +86,10 @@ def test_a_volume_a_mesh_and_a_scan_open_on_their_own_pages(page, address, scan)
     assert "#/rendering/vol-" in page.url
     ring = torus(12, 8)
     mesh = trimesh.Trimesh(ring.vertices, ring.faces, process=False).export(file_type="ply")
+    # What was refused is read before another page opens.
+    drop(page, "#volume-drop", ring=mesh, notes=b"only text", suffix="")
+    expect(page.locator("#volume-error")).to_contain_text("notes is not a scan, a volume or a mesh that ")
+    assert "#/rendering/vol-" in page.url
     drop(page, "#volume-drop", ring=mesh, suffix="")
     page.get_by_text("192 faces").wait_for()
     assert "#/surfaces/mesh-" in page.url

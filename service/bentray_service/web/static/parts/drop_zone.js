@@ -62,7 +62,7 @@ function useDrops(onFiles) {
 
 // name: "scan", "volume" or "mesh", which begins the ids; metadataOf(file): see resumableUpload. onStored(record, several) is called after
 // the last file, onRefused() when one is rejected, onBegin() when there is something to send again: by again.current(). A file of another kind
-// is stored, too, and its page opened if there is none of this kind.
+// is stored, too, and its page opened if there is none of this kind, and no error to read.
 export function DropZone({ name, accept = "", prompt, formats, again = {}, ...handlers }) {
   const { metadataOf, onStored, onRefused, onBegin } = useNewest(handlers).current;
   const [{ words, share, errors }, setState] = useState({ words: "", share: null, errors: [] });
@@ -100,7 +100,7 @@ export function DropZone({ name, accept = "", prompt, formats, again = {}, ...ha
     if (found.length) onRefused?.();
     try {
       if (stored) await onStored(stored, files.length > 1);
-      else if (elsewhere) go(elsewhere);
+      else if (elsewhere && !found.length) go(elsewhere);
     } catch (error) {
       change({ errors: [error] });
     }
