@@ -189,11 +189,7 @@ def reconstructions(
 
 
 def reconstructed(context: BenchmarkContext, scan: PhantomScan, method: str, workers: int) -> Run:
-    """Time SART by one Eikonal solver, a slice on each worker; one works in this process.
-
-    On a loaded machine the clock runs on while a process waits, so that the time is that of the processor
-    where it is less.
-    """
+    """Time SART by one Eikonal solver by the clock, a slice on each worker; one works in this process."""
     nodes, dataset = scan.scan.nodes, scan.dataset
     assert dataset.delta_tof_s is not None
     settings = Settings.from_values(
@@ -228,7 +224,7 @@ def reconstructed(context: BenchmarkContext, scan: PhantomScan, method: str, wor
         f"without skin, water {dataset.water_speed_mps:g} m/s: NRMSE {compared.error:.3f} of "
         f"the whole image, {inside:.3f} inside"
     )
-    return Run(min(clock, busy) * len(dataset.rx) / len(dataset.tx), compared, detail)
+    return Run(clock * len(dataset.rx) / len(dataset.tx), compared, detail)
 
 
 def processor_seconds(cluster: Cluster | None) -> Mapping[str, float]:
