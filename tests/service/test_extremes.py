@@ -115,7 +115,8 @@ def test_every_number_of_a_query_or_header_has_bounds(http, volume):
             if parameter["in"] != "query" or not {"integer", "number"} & {item.get("type") for item in types}:
                 continue
             where = path.format(
-                volume_id=volume["id"], **dict.fromkeys(("dataset_id", "job_id", "field_id"), "none")
+                volume_id=volume["id"],
+                **dict.fromkeys(("dataset_id", "job_id", "field_id", "mesh_id"), "none"),
             )
             for value in EXTREMES:
                 answer = http.get(where, params={**small, parameter["name"]: str(value)})

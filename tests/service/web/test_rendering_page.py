@@ -216,6 +216,7 @@ def test_an_iso_value_is_chosen_by_its_histogram(page, address, tmp_path):
     values = np.round(200.0 * sampled(ONE_HOLE, 14)).astype(np.uint8)
     page.goto(address + "/#/rendering")
     page.set_input_files("#volume-file", saved(tmp_path, values))
+    page.get_by_text(re.compile("^14 . 14 . 14 nodes")).wait_for()
     page.get_by_role("button", name="Surface", exact=True).click()
     histogram = page.get_by_role("img", name=re.compile(r"^Histogram of 2,744 nodes from 0 to 200"))
     histogram.wait_for()

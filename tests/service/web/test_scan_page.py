@@ -68,7 +68,7 @@ def test_changed_settings_are_sent_and_the_job_is_watched(page, address, scan, w
     assert page.get_by_text("Nothing has run yet").is_hidden()
     # Another one is cancelled here; on the page of a job: test_live_page.py.
     work.hold.clear()
-    page.get_by_role("button", name="Fast").click()
+    page.locator("#start").click()
     page.get_by_role("button", name="Cancel").click()
     page.locator(".state", has_text="cancelled").wait_for()
 
@@ -131,11 +131,11 @@ def test_a_refused_setting_is_told_at_its_field(page, address, scan, work):
 @pytest.mark.nightly
 def test_the_buttons_tell_their_time(page, serve, scan, work):
     sent(page, serve(), scan)
-    expect(page.get_by_role("button", name="Fast")).to_contain_text(re.compile(r"about \d+ s, rough"))
+    expect(page.locator("#start")).to_contain_text(re.compile(r"about \d+ s, rough"))
     for done in (1, 2, 3):
-        page.get_by_role("button", name="Fast").click()
+        page.locator("#start").click()
         expect(page.locator(".job").get_by_text("succeeded")).to_have_count(done)
-    fast = page.get_by_role("button", name="Fast")
+    fast = page.locator("#start")
     expect(fast).to_contain_text(re.compile(r"about \d+ s$"))
     # No traces, no waves: Best is the same work.
     expect(page.get_by_role("button", name="Best")).to_contain_text(re.compile(r"about \d+ s$"))
@@ -173,12 +173,12 @@ def test_a_volume_in_space_is_shown_as_glass(page, address, scan, work, monkeypa
         )
 
     sent(page, address, scan)
-    page.get_by_role("button", name="Fast").click()
+    page.locator("#start").click()
     page.get_by_role("img", name="Sound speed, Sixteen elements").wait_for()
     page.get_by_text("Sound speed, 1500 (dark) to").wait_for()
     expect(page.get_by_text("Volume rendering", exact=True).and_(page.locator("#jobs *"))).to_have_count(0)
     monkeypatch.setattr(type(work), "__call__", in_space)
-    page.get_by_role("button", name="Fast").click()
+    page.locator("#start").click()
     image = page.get_by_role("img", name="Volume rendering, Sixteen elements")
     image.wait_for()
     image.scroll_into_view_if_needed()
@@ -344,7 +344,7 @@ def test_name_notes_and_water_are_edited(page, own_traced, work):
     page.get_by_label("Receiver, from 0").fill("5")
     page.keyboard.press("Tab")
     expect(page.locator("#shot-values")).to_contain_text(f"straight line {1e6 * earlier:.2f} µs")
-    page.get_by_role("button", name="Fast").click()
+    page.locator("#start").click()
     page.locator(".job").get_by_text("succeeded").wait_for()
     assert [call[1].water_temperature_c for call in work.calls] == [31.5]
     # A setting of one reconstruction goes before what is stated of the scan.
