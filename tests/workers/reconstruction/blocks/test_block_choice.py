@@ -94,7 +94,7 @@ def path(tmp_path):
 
 @pytest.mark.nightly
 def test_a_run_is_in_blocks_where_memory_is_short_and_stays_so(path, tmp_path, monkeypatch):
-    settings = Settings.from_values(method="sart", nodes=24, decomposition="volume", iterations=1)
+    settings = Settings.from_values(method="sart", nodes=64, decomposition="volume", iterations=1)
     work = tmp_path / "work"
 
     def memory(scale):
