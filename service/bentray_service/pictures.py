@@ -269,8 +269,10 @@ class Pictures:
         how: dict[str, Any],
         refused: tuple[str, str] | None = None,
     ) -> Any:
-        tasks_of = lambda here: PictureTasks([(task, here)], None)  # noqa: E731 - as short as a call of it
-        return await self._made(item, cost, task.__name__, tasks_of, how, refused)
+        def alone(here: Path) -> PictureTasks:
+            return PictureTasks([(task, here)], None)
+
+        return await self._made(item, cost, task.__name__, alone, how, refused)
 
     async def _made(
         self,

@@ -137,7 +137,7 @@ def solve(problem: Problem, settings: Settings, blocks: Sequence[Rows], one_in: 
     Args:
         problem, settings: of the rows.
         blocks: rows.
-        one_in: the solutions at once are fewer by this factor.
+        one_in: one in so many of the passes over all rays is made; SART makes all of its iterations.
 
     Returns:
         of the region's shape, Np/m, at least 0; that of the water outside the array.

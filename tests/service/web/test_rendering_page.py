@@ -237,6 +237,13 @@ def test_an_iso_value_is_chosen_by_its_histogram(page, address, tmp_path):
     assert float(histogram.locator("line").get_attribute("x1")) == pytest.approx(256 * 40 / 200)
 
 
+def test_an_image_of_one_plane_does_not_show_another_volume(page, ball):
+    flat = {"id": "vol-flat", "name": "flat", "source": "upload", "shape": [8, 9], "links": {}}
+    page.route("**/v1/volumes/vol-flat", lambda route: route.fulfill(json=flat))
+    page.evaluate("location.hash = '#/rendering/vol-flat'")
+    page.get_by_text(re.compile("8 . 9 nodes, which cannot be rendered")).wait_for()
+
+
 @pytest.mark.nightly
 def test_display_errors_are_shown_as_text(page, ball, tmp_path):
     page.route("**/*filter=*", lambda route: route.abort())

@@ -242,6 +242,7 @@ const loadVolumes = async () => (await load("volumes")).filter((volume) => volum
 
 export async function open({ id, query }) {
   document.title = "Volume rendering – Bentray";
-  const [volumes, fields] = await Promise.all([loadVolumes(), propertiesOf("Turntable"), id && request(`/v1/volumes/${id}`)]);
+  const [volumes, fields, asked] = await Promise.all([loadVolumes(), propertiesOf("Turntable"), id && request(`/v1/volumes/${id}`)]);
+  if (asked && !asked.links.refraction) throw new Error(`${titleOf(asked)} has ${asked.shape.join(" × ")} nodes, which cannot be rendered; accepted: a volume with equal spacings`);
   return html`<${Rendering} volumes=${volumes} id=${id} query=${query} fields=${fields} />`;
 }
